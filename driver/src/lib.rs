@@ -2,10 +2,10 @@
 //! chips in this process or on cards at the other end of a link.
 //!
 //! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of
-//! on-chip memory, a private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate is
-//! what runs on the host: it loads a scene, traces photons, packs scene and photon map into a *card image*,
-//! sends the image to each card, assigns tiles to the cards and assembles the picture. The picture is equal,
-//! bit for bit, for any number and kind of cards.
+//! on-chip memory, a private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate runs
+//! on the host: it loads a scene, traces photons, packs scene and photon map into a *card image*, sends the
+//! image to each card, assigns tiles to the cards and assembles the picture. The picture is equal, bit for
+//! bit, for any number and kind of cards.
 //!
 //! # First steps
 //!
@@ -43,18 +43,18 @@
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
 //! [`Quality::settings`](quality::Quality::settings) returns the settings of a `--quality` for an unknown
 //! scene, with the fewest samples and medium numbers of rays and photons.
-//! [`Quality::fit`](quality::Quality::fit) chooses these numbers for a scene;
-//! [`render_chosen`](render::render_chosen) lets it do so during a render. `RenderSettings::default()` is
-//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All these settings are for
-//! one emulated reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
-//! [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards
-//! that stay open. [`tone_mapping::write_png`] writes a tone-mapped PNG; [`difference`] compares two
-//! pictures.
+//! [`Quality::fit`](quality::Quality::fit) chooses these numbers for a given scene;
+//! [`render_chosen`](render::render_chosen) can call it once the scene is packed. `RenderSettings::default()`
+//! is [`Quality::Paper`](quality::Quality::Paper), the nominal frame of Steinhurst's dissertation (2007). All
+//! these settings are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
+//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders
+//! further pictures on cards that stay open. [`tone_mapping::write_png`] writes a tone-mapped PNG;
+//! [`difference`] compares two pictures.
 //!
 //! # Cards
 //!
-//! [`CardAddress`](render::CardAddress) names cards as `--card` does. One render can use both emulated and
-//! remote cards:
+//! [`CardAddress`](render::CardAddress) names cards in the syntax of the option `--card`. One render can use
+//! both emulated and remote cards:
 //!
 //! ```
 //! use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
@@ -71,8 +71,8 @@
 //!
 //! # Progress and cancellation
 //!
-//! [`Observer`](render::Observer) is called from the threads of a render, and ends it by
-//! [`is_stopped`](render::Observer::is_stopped):
+//! The threads of a render call its [`Observer`](render::Observer). The render ends early when
+//! [`is_stopped`](render::Observer::is_stopped) returns true:
 //!
 //! ```
 //! use std::sync::atomic::{AtomicBool, Ordering};
@@ -117,7 +117,7 @@
 //! - [`photoncard_render`] ([`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`],
 //!   [`cost_model`]): a render from a scene to a complete film; emulated chips on threads of this process;
 //!   settings from pilot renders; the file of finished tiles; parts of a picture and their merge; the client
-//!   of a display server; FLOPs and DRAM bytes by Table 7.1.
+//!   of a display server; FLOPs and DRAM bytes by Table 7.1 of the dissertation.
 //! - [`photoncard_study`] ([`study`]): measurements of shipped scenes, and reports.
 //!
 //! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, whose
@@ -131,8 +131,8 @@
 //! Film -> denoise -> exr, tone_mapping
 //! ```
 //!
-//! Terms are defined in `docs/glossary.md`, design decisions are in `docs/architecture.md`, and "how to add"
-//! lists in `CONTRIBUTING.md`.
+//! `docs/glossary.md` defines the terms, `docs/architecture.md` explains design decisions, and
+//! `CONTRIBUTING.md` has "how to add" lists.
 #![forbid(unsafe_code)]
 
 pub use photoncard_cards::{dispatcher, link, scheduler, session};

@@ -1,19 +1,19 @@
-//! Fixed-point sums, whose bits do not depend on the order of the terms.
+//! Fixed-point sums: their results do not depend on the order of the terms, bit for bit.
 //!
-//! A term is rounded once to 2^-40 of a unit and added as an integer. Integer addition is associative, unlike
-//! floating-point addition. The unit is a power of two near the largest term, chosen by the host for each
-//! scene.
+//! A term is rounded to a multiple of 2^-40 units and added as an integer. Integer addition is associative,
+//! unlike floating-point addition. The unit is a power of two near the largest term; the host chooses it for
+//! each scene.
 
 use fixed::types::I24F40;
 use glam::Vec3;
 use photoncard_shared::layout::Rgbe;
 
-/// 2^40: number of steps of a sum per unit. The number is exact in `f32`, and so are products with it.
+/// Number of steps of a sum per unit, 2^40. A power of two, so that products with it are exact in `f32`.
 const SCALE: f32 = (1_u64 << 40) as f32;
 
 /// Fixed-point sum of numbers, exact except for the rounding of each term.
 ///
-/// Its range is -2^23 to 2^23 units; [`Self::add`] wraps beyond.
+/// The range is -2^23 to 2^23 units; [`Self::add`] wraps around beyond it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum(I24F40);
 
@@ -21,15 +21,15 @@ impl Sum {
     /// Sum without terms.
     pub const ZERO: Self = Self(I24F40::ZERO);
 
-    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40. NaN counts as 0; terms out of
-    /// range are clamped.
+    /// Adds a term, in units, after rounding it towards zero to a multiple of 2^-40. NaN counts as 0; a term
+    /// out of range is clamped.
     #[inline(always)]
     pub fn add(&mut self, term: f32) {
         self.add_bits((term * SCALE) as i64);
     }
 
-    /// Adds a non-negative term, in units, and saturates. The order does not matter, because a sum that only
-    /// grows saturates in every order or in none.
+    /// Adds a non-negative term, in units; the sum saturates. The result does not depend on the order,
+    /// because a sum that only grows saturates in every order or in none.
     #[inline(always)]
     fn add_up_to_greatest(&mut self, term: f32) {
         let bits = ((term * SCALE) as i64).max(0);
@@ -50,8 +50,8 @@ impl Sum {
 
 /// Fixed-point sum of colours, exact except for the rounding of each term.
 ///
-/// Each component is a [`Sum`]. The sum of k photons of one power unit each, times a reflectance of at most a
-/// few thousand, is far below the limit of 2^23 units.
+/// Each component is a [`Sum`]. The reflected power of k photons of one unit each is far below the limit of
+/// 2^23 units, since the factors are at most a few thousand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
@@ -59,7 +59,7 @@ impl ColourSum {
     /// Sum without terms.
     pub const ZERO: Self = Self([Sum::ZERO; 3]);
 
-    /// Adds a colour, in units ([`Sum::add`]).
+    /// Adds a colour, in units, by [`Sum::add`].
     #[inline(always)]
     pub fn add(&mut self, term: Vec3) {
         for (sum, component) in self.0.iter_mut().zip(term.to_array()) {
@@ -67,7 +67,7 @@ impl ColourSum {
         }
     }
 
-    /// Adds a colour with non-negative components, in units; components saturate at 2^23 units.
+    /// Adds a colour with non-negative components, in units. Each component saturates at 2^23 units.
     #[inline(always)]
     pub fn add_light(&mut self, light: Vec3) {
         for (sum, component) in self.0.iter_mut().zip(light.to_array()) {
@@ -75,7 +75,7 @@ impl ColourSum {
         }
     }
 
-    /// Adds a sum of light, and saturates at 2^23 units. The result equals the sum of all terms of both.
+    /// Adds a sum of non-negative terms; saturates. The result equals a single sum of all terms.
     #[inline(always)]
     pub fn add_sum(&mut self, light: &Self) {
         for (sum, more) in self.0.iter_mut().zip(light.0) {
@@ -83,14 +83,14 @@ impl ColourSum {
         }
     }
 
-    /// Adds an [`Rgbe`] colour in integer arithmetic. The result has the same bits as [`Self::add`] of the
-    /// decoded colour.
+    /// Adds an [`Rgbe`] colour in integer arithmetic. The result is the same, bit for bit, as with
+    /// [`Self::add`] and the decoded colour.
     #[inline(always)]
     pub fn add_rgbe(&mut self, power: Rgbe) {
         self.add_powers(&[u32::from_le_bytes(power.0).into()]);
     }
 
-    /// Adds the [`Rgbe`] colour in the low four bytes of each photon content.
+    /// Adds the power of each photon content: an [`Rgbe`] colour in its low four bytes.
     #[inline(always)]
     pub(crate) fn add_powers(&mut self, photons: &[u64]) {
         let mut sums = [0_u64; 3];
@@ -106,7 +106,7 @@ impl ColourSum {
         }
     }
 
-    /// Subtracts a colour that was added by [`Self::add_powers`].
+    /// Subtracts the power of a photon content that [`Self::add_powers`] has added.
     #[inline(always)]
     pub(crate) fn subtract_power(&mut self, photon: u64) {
         for (sum, bits) in self.0.iter_mut().zip(bits_of_power(photon)) {
@@ -114,7 +114,7 @@ impl ColourSum {
         }
     }
 
-    /// Sum of each channel, in steps of 2^-40 units.
+    /// Value of each channel, in steps of 2^-40 units.
     #[inline(always)]
     pub fn bits(&self) -> [i64; 3] {
         self.0.map(|Sum(sum)| sum.to_bits())
@@ -127,7 +127,7 @@ impl ColourSum {
     }
 }
 
-/// Components, in steps of 2^-40 units, of the [`Rgbe`] colour in the low four bytes of a photon content.
+/// Power of a photon content by channel, in steps of 2^-40 units: the [`Rgbe`] colour in its low four bytes.
 #[inline(always)]
 fn bits_of_power(photon: u64) -> [u64; 3] {
     // Exponent byte with which a mantissa counts steps of 2^-40 units.

@@ -5,8 +5,8 @@
 //!
 //! # Example
 //!
-//! A card consists of its firmware and its DRAM. In this example it answers a host's first message. On a
-//! port, [`serve::serve`] moves the bytes:
+//! A card consists of its firmware and its DRAM. In this example it answers a host's first message. On a real
+//! link, [`serve::serve`] moves the bytes.
 //!
 //! ```
 //! use photoncard_firmware::card::MicroCard;

@@ -1,73 +1,74 @@
-//! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of
-//! execution.
+//! Random numbers as functions of (seed, pixel, sample, dimension). They do not depend on chip, thread or
+//! order of execution.
 //!
-//! Points in a pixel, points on emitters and the first choices of an eye path are the first points of a
-//! sequence, not a set of a fixed size, so that samples can be added to a picture and any number of them is
-//! stratified. The sequence is the first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform
-//! scrambling. Its order is scrambled in the same way, so that patterns of different dimensions are
-//! independent (Burley 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned
-//! run of 2^m points has one point in every box of area 2^-m whose sides are powers of two.
+//! Positions in a pixel, positions on emitters and the first choices of an eye path are points of a sequence.
+//! Samples can therefore be added to a picture, and any number of them is stratified. The sequence is the
+//! first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling. The order of its
+//! points is scrambled in the same way, so that patterns of different dimensions are independent (Burley
+//! 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has
+//! one point in every elementary interval of area 2^-m.
 //!
-//! A final gather ray has two coordinates. The first is jittered ([`Pattern::jitter`]) and selects a cell of
-//! the direction table ([`crate::importance::DirectionTable`]); the second is a radical inverse. Any run of
-//! consecutive rays, such as those of one cell of the table, is stratified in both.
+//! The direction of a final gather ray is chosen by two coordinates. The first is jittered
+//! ([`Pattern::jitter`]) and selects a cell of the direction table ([`crate::importance::DirectionTable`]);
+//! the second is a radical inverse. Any run of consecutive rays, such as those of one cell, is stratified in
+//! both.
 
 pub use photoncard_shared::hash::hash;
 
-/// Dimension of a random number, which states its purpose. Patterns of different dimensions are independent.
+/// Purpose of a random number. Patterns of different dimensions are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Dimension {
     /// Position in the pixel.
     Pixel = 1,
-    /// Choice of a shadow ray's light, and of a point on it.
+    /// Choice of the light of a shadow ray, and of a point on the light.
     Emitter = 2,
     /// Directions of a sample's final gather rays.
     Gather = 3,
     /// Directions of an irradiance record's final gather rays.
     Irradiance = 4,
-    /// Directions of an irradiance record's survey rays.
+    /// Directions of the rays that measure the distances to the surroundings of an irradiance record.
     Survey = 5,
-    /// Random choices on an eye path: between reflection, transmission and an end at a perfectly specular
-    /// surface, and between material layers.
+    /// Random choices on an eye path: of a material layer; and at perfectly specular surfaces, of reflection,
+    /// transmission or the end of the path.
     Specular = 6,
-    /// Direction of the ray that finds the albedo and normal of the surface that a sharp lobe reflects.
+    /// Direction of the ray that finds albedo and normal of a surface reflected in a sharp lobe.
     Features = 7,
 }
 
-/// Random pattern of points for one pixel, sample and dimension.
+/// Source of random points and numbers for one pixel, sample and dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pattern(u32);
 
 impl Pattern {
-    /// Creates the pattern of a pixel, sample and dimension. A pattern that all samples of a pixel share has
-    /// sample 0.
+    /// Creates the pattern of a pixel, sample and dimension. `sample` is 0 if all samples of a pixel share
+    /// the pattern.
     #[inline(always)]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32, dimension: Dimension) -> Self {
         let pixel = hash(hash(seed ^ 0x9e37_79b9).wrapping_add(x)).wrapping_add(y);
         Self(hash(hash(hash(pixel).wrapping_add(sample)).wrapping_add(dimension as u32)))
     }
 
-    /// Random bits for point `index`, independent of the point's coordinates, to dither values.
+    /// Random bits for dithering at point `index`. They are independent of the point's coordinates.
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
         self.bits(index, 0x2545_f491)
     }
 
-    /// Random number in [0, 1) for choice number `choice` on the path that starts with point `index`.
+    /// Random number in [0, 1) for choice number `choice` on the path that starts at point `index`.
     #[inline(always)]
     pub fn choice(self, index: u32, choice: u32) -> f32 {
         unit_interval(hash(self.bits(index, 0x1656_67b1).wrapping_add(choice)))
     }
 
-    /// Random bits for the position of point `index` within its stratum of [0, 1).
+    /// Random bits that determine the position of point `index` within its stratum of [0, 1).
     #[inline(always)]
     pub fn jitter(self, index: u32) -> u32 {
         self.bits(index, 0x967a_889b)
     }
 
-    /// Base-2 radical inverse of `index`, in [0, 1), with randomly flipped digits (XOR scrambling). Each
-    /// aligned run of 2^m indices has one point in every stratum of width 2^-m.
+    /// Base-2 radical inverse of `index`, in [0, 1), with XOR scrambling. Each aligned run of 2^m indices has
+    /// one point in every stratum of width 2^-m.
     #[inline(always)]
     pub fn radical_inverse(self, index: u32) -> f32 {
         unit_interval(index.reverse_bits() ^ hash(self.0.wrapping_add(0x368c_c8b7)))
@@ -89,17 +90,17 @@ impl Pattern {
     }
 }
 
-/// Digits of Sobol's second dimension at `index`, least significant bit first. Bit `i` is the sum modulo 2 of
-/// the bits `j` of the index for which the binomial coefficient (j, i) is odd; by Lucas's theorem, these are
-/// the `j` that contain all bits of `i`.
+/// Binary digits of Sobol's second dimension at `index`, least significant bit first. Bit `i` is the sum
+/// modulo 2 of those bits `j` of `index` for which the binomial coefficient `C(j, i)` is odd. By Lucas's
+/// theorem this holds if `j & i == i`.
 #[inline(always)]
 fn second_dimension(index: u32) -> u32 {
     let steps = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)];
     steps.into_iter().fold(index, |digits, (distance, mask)| digits ^ (digits >> distance & mask))
 }
 
-/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends
-/// only on itself and lower bits (Laine, Karras 2011, with Vegdahl's constants of 2021).
+/// Owen scrambling of binary digits, least significant bit first: a bijection in which each bit of the result
+/// depends only on the same and lower bits (Laine, Karras 2011, with Vegdahl's constants of 2021).
 #[inline(always)]
 fn scramble(mut digits: u32, seed: u32) -> u32 {
     digits ^= digits.wrapping_mul(0x3d20_adea);
@@ -115,7 +116,7 @@ pub fn radical_inverse(index: u32) -> f32 {
     unit_interval(index.reverse_bits())
 }
 
-/// The 24 upper bits as a number in [0, 1).
+/// Converts the 24 upper bits to a number in [0, 1), in steps of 2^-24.
 #[inline(always)]
 pub(crate) fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
@@ -170,8 +171,8 @@ mod tests {
         }
     }
 
-    /// For points of equal index in two dimensions, strata must be paired at random: each pair of halves has
-    /// a fourth of the pixels' points.
+    /// Tests points of equal index in two dimensions. Their halves of [0, 1) must be paired at random: each
+    /// of the four pairs must occur in a fourth of the pixels.
     #[test]
     fn patterns_of_two_dimensions_are_independent() {
         let half = |x, index, dimension| {

@@ -13,7 +13,7 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 
 /// Serves a card on a port until the port fails: receives bytes, works, and sends bytes.
 ///
-/// At most one call of [`Card::work`] lies between two reads of the port.
+/// Calls [`Card::work`] at most once between two reads of the port.
 ///
 /// # Errors
 /// The port's failure; [`PortError::Closed`] is the regular end of a session.

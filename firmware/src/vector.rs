@@ -2,26 +2,26 @@
 
 use glam::Vec3;
 
-/// Minimum of two numbers; `b` if either is NaN, like SSE's `minss`.
+/// Minimum of two numbers; `b` if one of them is NaN (like SSE's `minss`).
 #[inline(always)]
 pub(crate) fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Maximum of two numbers; `b` if either is NaN, like SSE's `maxss`.
+/// Maximum of two numbers; `b` if one of them is NaN (like SSE's `maxss`).
 #[inline(always)]
 pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Mirrors a unit vector about a unit normal.
+/// Mirror direction about a unit normal: `2 (n.d) n - d`.
 #[inline(always)]
 pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
     normal * (2.0 * normal.dot(direction)) - direction
 }
 
-/// Two unit vectors that form a right-handed frame with a unit normal (Duff et al. 2017, *Building an
-/// orthonormal basis, revisited*).
+/// Unit tangent and bitangent that form a right-handed orthonormal basis with a unit normal (Duff et al.
+/// 2017, *Building an orthonormal basis, revisited*).
 #[inline(always)]
 pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
     let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
@@ -32,15 +32,15 @@ pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
     (tangent, bitangent)
 }
 
-/// Vector with the coordinates `x`, `y`, `z` in the frame of [`tangents`], whose z axis is `normal`.
+/// Vector with the coordinates `x`, `y`, `z` along tangent, bitangent ([`tangents`]) and `normal`.
 #[inline(always)]
 pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
     let (tangent, bitangent) = tangents(normal);
     tangent * x + bitangent * y + normal * z
 }
 
-/// Vector with cylindrical coordinates about `axis`, in the frame of [`tangents`]: azimuth in radians,
-/// radius, and height along the axis.
+/// Vector with the given cylindrical coordinates about `axis`: azimuth in radians from the first of the
+/// [`tangents`], radius, and height along the axis.
 #[inline(always)]
 pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 {
     let (y, x) = libm::sincosf(azimuth);
@@ -60,14 +60,14 @@ pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// Converts an `f32` to bfloat16, rounded to nearest, ties away from zero. Finite numbers that round to more
-/// than the largest bfloat16 become infinite; a NaN may become any number.
+/// Converts an `f32` to the bits of a bfloat16, rounded to nearest, ties away from zero. Finite numbers above
+/// the largest bfloat16 round to infinity. A NaN gives an arbitrary value.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }
 
-/// Converts a bfloat16 to `f32`.
+/// Converts the bits of a bfloat16 to `f32`.
 #[inline(always)]
 pub(crate) fn from_upper_half(half: u16) -> f32 {
     f32::from_bits((half as u32) << 16)

@@ -1,8 +1,8 @@
-//! Traversal of a tree of sixteen-wide nodes: the bounding volume hierarchy, or a photon map in the line
-//! layout.
+//! Traversal of a tree whose nodes have up to sixteen children: the bounding volume hierarchy, or a photon
+//! map with leaves.
 //!
 //! A visit of a node computes the distances to the boxes of all children at once. Children within the search
-//! limit are pushed onto a stack, with the nearest on top.
+//! distance are pushed onto a stack, with the nearest on top.
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
@@ -16,15 +16,15 @@ use crate::simd::{Isa, LANES};
 
 const _: () = assert!(NODE_CHILDREN == LANES);
 
-/// Value in place of a child's distance bits, for a child to be skipped.
+/// Value of a child's distance bits that means that the child is skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
-/// Stack entry of a subtree: in the upper half the `f32` bits of a lower bound of its distance, or other bits
-/// that it was pushed with; in the lower half the index of its leaf or node.
+/// Stack entry of a leaf or node. The upper 32 bits are its distance bits: the `f32` bits of a lower bound of
+/// its distance, or other bits from the caller. The lower 32 bits are its index and the flag `LEAF`.
 #[derive(Clone, Copy)]
 struct Deferred(u64);
 
-/// Flag in the lower half of a [`Deferred`] that marks a leaf.
+/// Flag in the lower 32 bits of a [`Deferred`] that marks a leaf.
 const LEAF: u32 = 1 << 31;
 
 /// Index of a leaf that no card image has. On the stack it lies below the parts of a group
@@ -44,16 +44,16 @@ impl Deferred {
     }
 }
 
-/// Stack of [`Deferred`] subtrees with the next one on top. `ENTRIES` is the maximum that the tree needs plus
-/// [`LANES`], because all lanes of a node are written at once.
+/// Stack of [`Deferred`] entries. The capacity `ENTRIES` is the maximum that the tree needs plus [`LANES`],
+/// because all lanes of a node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
 /// Order in which a node's children are visited.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// Nearest first. Hits or photons found in a child shrink the limit for the others.
+    /// Nearest first. Hits or photons found in one child shrink the search distance for the others.
     NearestFirst,
-    /// Unsorted, for searches that end with the first hit. Sorting would cost more than it saves.
+    /// Unsorted, for searches that end at the first hit. Sorting would cost more than it saves.
     Any,
 }
 
@@ -75,7 +75,7 @@ pub(crate) struct Descent<'s, const ENTRIES: usize> {
 }
 
 impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
-    /// Creates a traversal that begins at the root of the tree in two sections. `stack` is emptied.
+    /// Creates a traversal that starts at the root of a tree, given by its two sections. Empties `stack`.
     #[inline(always)]
     pub(crate) fn new(
         scene: &'s SceneImage,
@@ -86,7 +86,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self::with_root(scene, [nodes, leaves], stack, 0)
     }
 
-    /// Creates the traversal of [`Self::new`] with `bits` instead of 0 as the root's distance bits.
+    /// Does [`Self::new`] with `bits` instead of 0 as the root's distance bits.
     #[inline(always)]
     pub(crate) fn with_root(
         scene: &'s SceneImage,
@@ -142,7 +142,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(None)
     }
 
-    /// Returns the next leaf or node, and the distance bits it was pushed with; `None` at the end.
+    /// Returns the next leaf or node with its distance bits; `None` at the end of the traversal.
     ///
     /// # Errors
     /// As [`Self::next`].
@@ -165,7 +165,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 
     /// Visits a node: pushes its children and prefetches their lines. `distances` maps the node's line to the
-    /// bits of a lower bound of each child's distance, or to [`BEYOND`] for a child to be skipped.
+    /// distance bits of each child, or [`BEYOND`] for a child to be skipped.
     ///
     /// # Errors
     /// [`FaultCode::Depth`] if the stack overflows; [`FaultCode::Record`] or [`FaultCode::LineRange`] if
@@ -201,7 +201,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(())
     }
 
-    /// Pushes the lanes of `parts` that are in `mask`; `None` if the stack overflows.
+    /// Pushes the elements of `parts` whose bits are set in `mask`; returns `None` if the stack overflows.
     #[inline(always)]
     fn push(&mut self, isa: impl Isa, parts: &[u64; LANES], mask: u32) -> Option<()> {
         let bottom = self.stack.len();
@@ -230,7 +230,7 @@ fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES
     parts
 }
 
-/// Sorts a few entries by insertion, in descending order.
+/// Sorts stack entries in descending order, by insertion.
 #[inline(always)]
 fn sort(parts: &mut [u64]) {
     for sorted in 1..parts.len() {

@@ -16,8 +16,8 @@ use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::progress::{Progress, stop_on_signals};
 
-/// Prints the budget that a card reports, the memory use that a board measures and, for an emulated card, the
-/// sizes of the firmware's buffers.
+/// Prints the capacities that a card reports. Adds the measured memory use of a board, and the sizes of an
+/// emulated card's buffers.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;
@@ -61,8 +61,8 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// Returns the table rows of an emulated chip's buffers, of the techniques' shares of them, and of the
-/// on-chip memory that is free.
+/// Returns table rows about an emulated chip's on-chip memory: its buffers, the bytes of them that each
+/// technique uses, and the free bytes.
 fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [
@@ -74,7 +74,8 @@ fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     ]
 }
 
-/// Sends a card `count` hellos, and prints the time until each answer, with the least, mean and greatest.
+/// Sends `count` hello messages to a card. Prints the time until each answer, and the minimum, mean and
+/// maximum.
 pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
     let answers = card_ping(address, count.into())?;
     let mut lines = Vec::new();
@@ -193,7 +194,7 @@ fn time(time: Duration, bytes: u64) -> String {
     format!("{seconds:.3} s ({rate:.1} MB/s)")
 }
 
-/// Error of a card that failed the test, with a remedy.
+/// Failure that states the defects of a card that fails its self-test, with a remedy.
 fn test_failure(test: &SelfTest) -> Failure {
     let mut parts = Vec::new();
     if !test.arithmetic.wrong.is_empty() {

@@ -1,5 +1,5 @@
-//! Standard streams: all output passes through this module. A closed or full stream never makes the program
-//! panic, and unprintable characters, which text from files and devices may have, are escaped.
+//! Output to the standard streams: all output of the program passes through this module. A closed or full
+//! stream never makes the program panic. Unprintable characters in text from files and devices are escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -9,8 +9,8 @@ use photoncard_driver::printable::printable;
 use crate::failure::Failure;
 use crate::flags::with_flags;
 
-/// Writes a line to standard error. Names of settings from the library's errors, such as
-/// `integrator.samples`, are replaced by flags. Errors of the stream are ignored.
+/// Writes a line to standard error. Settings' names in errors of the library, such as `integrator.samples`,
+/// are replaced by command-line flags. Errors of the stream are ignored.
 pub(crate) fn say(line: Arguments) {
     let _ = writeln!(stderr(), "{}", printable(&with_flags(&line.to_string())));
 }
@@ -35,8 +35,8 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// Replaces the unprintable characters of a JSON text by `\u` escapes, except line ends. The text must have
-/// all other unprintable characters in strings, where the escapes have the same meaning.
+/// Replaces each unprintable character of a JSON text, except line ends, by a `\u` escape. All these
+/// characters must be in JSON strings, where the escape means the same character.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -53,8 +53,8 @@ pub(crate) fn printable_json(text: &str) -> String {
     escaped
 }
 
-/// Writes text of the program's own to standard output unescaped. A reader that closes the stream early is no
-/// error.
+/// Writes text to standard output without escapes; the text must be the program's own. It is no error if the
+/// reader closes the stream early.
 pub(crate) fn write_out(text: &str) -> Result<(), Failure> {
     write_bytes(text.as_bytes())
 }

@@ -22,22 +22,22 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Creates a failure of the input from an error with a remedy.
+    /// Creates an `Input` failure from an error that may have a remedy.
     pub(crate) fn input(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Input(Report::new(error))
     }
 
-    /// Creates a failure of the work from an error with a remedy.
+    /// Creates a `Work` failure from an error that may have a remedy.
     pub(crate) fn work(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Work(Report::new(error))
     }
 
-    /// Creates a failure of the input from an error without a remedy. The causes are kept.
+    /// Creates an `Input` failure from an error without a remedy. The message includes the error's causes.
     pub(crate) fn input_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Input(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// Creates a failure of the work from an error without a remedy. The causes are kept.
+    /// Creates a `Work` failure from an error without a remedy. The message includes the error's causes.
     pub(crate) fn work_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
@@ -74,7 +74,6 @@ impl Failure {
         }
     }
 
-    /// Exit status.
     pub(crate) fn status(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),

@@ -2,7 +2,7 @@
 
 use photoncard_driver::render::{RenderSettings, Setting};
 
-/// Names in the library's errors that are no field of the settings, and the flags that replace them.
+/// Names in the library's errors besides fields of the settings, each with the flags that replace it.
 const OTHERS: [[&str; 2]; 3] = [
     ["`cards.caches`", "--counters or --cache"],
     ["`CardAddress::with_memory`", "--card-memory"],

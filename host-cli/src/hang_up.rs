@@ -1,6 +1,6 @@
 //! Hang-ups (SIGHUP) of the terminal that started the process.
 
-/// Returns whether the process ignores SIGHUP, as `nohup` arranges, according to the signal mask in `/proc`.
+/// Returns whether the process ignores SIGHUP, as under `nohup`, by the mask of ignored signals in `/proc`.
 /// `None` if the mask is not available.
 pub(crate) fn is_ignored() -> Option<bool> {
     /// Bit of SIGHUP, signal 1, in the mask.

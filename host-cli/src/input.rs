@@ -12,7 +12,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 
-/// Lists the input files, each with the words by which errors name it.
+/// Lists the input files, each with its name in errors, such as `the scene`.
 pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     let mut files = vec![(options.path.as_path(), "the scene")];
     if let Some(EnvironmentOption::File(path)) = &options.environment {
@@ -51,7 +51,7 @@ impl Input {
         })
     }
 
-    /// Scene at rest. Assignments (`--set`) are not applied.
+    /// Returns the scene without animation. Assignments (`--set`) are not applied.
     pub(crate) fn at_rest(&self) -> Result<Scene, Failure> {
         let scene = self.file.at_rest().map_err(Failure::input)?;
         Ok(self.completed(scene))
@@ -68,10 +68,9 @@ impl Input {
     }
 }
 
-/// Completes a loaded scene: compensates the energy of rough reflections if requested, and adds the
-/// environment with the notice about clamped texels. The environment is turned by `rotation` degrees, in
-/// addition to the convention of the program that wrote the scene. Remarks are added about this convention,
-/// and about a rotation that has no effect.
+/// Completes a loaded scene. Compensates the energy of rough reflections if requested. Adds the environment,
+/// with the notice about clamped texels. The environment is turned by `rotation` degrees, plus the turn that
+/// the scene's exporter implies. Adds remarks about this turn, and about a rotation without effect.
 fn completed(
     mut scene: Scene,
     (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),

@@ -4,9 +4,9 @@ use std::fs::read_to_string;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Free memory at the first call, bytes: Linux's estimate of the memory that is available on the machine, but
-/// at most the limit of this process's address space and the memory that its control groups leave. `None` on
-/// other systems.
+/// Returns the free memory at the first call, bytes; `None` on systems other than Linux. It is the minimum of
+/// Linux's estimate for the machine, the limit of this process's address space, and the memory that the
+/// process's control groups leave.
 pub(crate) fn free_memory() -> Option<u64> {
     static FREE: OnceLock<Option<u64>> = OnceLock::new();
     *FREE.get_or_init(|| {
@@ -29,8 +29,8 @@ fn address_space(text: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// Memory that the control groups of this process (version 2) leave, bytes: the minimum over its group and
-/// all groups that contain it. `None` if none of these groups has a limit.
+/// Returns the memory that the control groups (cgroup v2) of this process leave, bytes: the minimum over its
+/// group and all groups that contain it. `None` if none of these groups has a limit.
 fn of_groups() -> Option<u64> {
     let groups = read_to_string("/proc/self/cgroup").ok()?;
     let own = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -41,9 +41,9 @@ fn of_groups() -> Option<u64> {
     free.min()
 }
 
-/// Memory that a control group leaves, bytes, by the texts of its files `memory.max`, `memory.current` and
-/// `memory.stat`; `None` without a limit. Cached pages of files that are not in active use (`inactive_file`)
-/// count as free.
+/// Returns the memory that a control group leaves, bytes: its limit less its use; `None` without a limit. The
+/// texts are those of its files `memory.max`, `memory.current` and `memory.stat`. Cached pages of files that
+/// are not in active use (`inactive_file`) count as free.
 fn free_of_group([most, taken, parts]: [&str; 3]) -> Option<u64> {
     let [most, taken]: [u64; 2] = [most.trim().parse().ok()?, taken.trim().parse().ok()?];
     let unused = parts.lines().find_map(|line| line.strip_prefix("inactive_file "));

@@ -1,5 +1,5 @@
-//! Notices about a scene: contents that are ignored, missing, or interpreted in another way than they are
-//! stated.
+//! Notices about contents of a scene that are ignored, missing, or interpreted otherwise than the file
+//! states.
 
 use std::path::Path;
 
@@ -23,8 +23,7 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Returns which contents of the scene file are used by `picture` or, if `frames` states any, by its
-    /// frames.
+    /// Returns the contents that the pictures use: `picture` or, if `frames` states any, the frames.
     pub(crate) fn of(options: &SceneOptions, picture: &Picture, frames: Option<&FrameOptions>) -> Self {
         Self {
             view: !picture.states_view(),
@@ -59,7 +58,7 @@ pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) ->
     Err(Failure::Input(Report::new(report.with_help(help))))
 }
 
-/// Prints remarks about contents that are interpreted in another way than they are stated.
+/// Prints remarks about contents that are interpreted otherwise than the file states.
 pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     let remarks: Vec<_> = scene.remarks.iter().map(String::as_str).collect();
     if let Some(line) = first(path, &remarks) {
@@ -123,8 +122,8 @@ mod tests {
         assert_eq!(refused("", &scene.with(|scene| scene.notices.clear())), None);
     }
 
-    /// Each case has a notice about contents of the file, options with which pictures do not use these
-    /// contents, and, if there are any, options with which pictures use them.
+    /// Each case has the contents that a notice is about, options that replace these contents, and options
+    /// with which pictures use them, if there are any.
     #[test]
     fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [

@@ -11,7 +11,7 @@ use photoncard_driver::printable::printable;
 
 use crate::flags::with_flags;
 
-/// Number of columns before the text of an excerpt: those of `   │ `.
+/// Width of the mark `   │ ` before an excerpt's text, columns.
 const EXCERPT_MARK: usize = 5;
 
 /// Installs the layout. Lines are broken on a terminal only, so that a path in a log stays in one piece.
@@ -62,7 +62,7 @@ impl Layout {
         if self.has_colours { format!("{style}{text}{style:#}") } else { text.to_string() }
     }
 
-    /// Prints text. `marks` stand before the first line and before each of the others.
+    /// Prints `text` with `marks[0]` before its first line and `marks[1]` before each other line.
     fn paragraph(&self, f: &mut Formatter<'_>, style: Style, marks: [&str; 2], text: &str) -> Result {
         let [mut mark, next] = marks;
         for line in text.lines() {
@@ -74,8 +74,8 @@ impl Layout {
         Ok(())
     }
 
-    /// Prints each line of a file that an error points at, with a mark below the position. The error has
-    /// escaped the line already, as its labels are offsets in the escaped text.
+    /// Prints each line of a file that an error points at, with a mark below the position. The line is
+    /// already escaped: the error's labels are offsets in escaped text.
     fn excerpt(&self, f: &mut Formatter<'_>, error: &dyn Diagnostic) -> Result {
         let (Some(source), Some(labels)) = (error.source_code(), error.labels()) else { return Ok(()) };
         for label in labels {
@@ -139,8 +139,8 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// Cuts a part of at most `width` characters out of a line, so that a mark of `mark` columns that begins
-/// below column `at` fits into `width` columns. Returns the part, and the column in it of `at`. An ellipsis
+/// Cuts at most `width` characters out of a line, and returns them with the new column of the character `at`.
+/// A mark of `mark` columns, which begins below this character, also fits into `width` columns. An ellipsis
 /// replaces the character at each end that is cut off.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();

@@ -19,7 +19,7 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const LINEAR: u32 = 9729;
 
-/// Vertices and indices in the file, which any number of meshes may use.
+/// Vertices and indices that are in the file. Any number of meshes can use them.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     pub(crate) attributes: PrimitiveAttributes,
@@ -30,8 +30,8 @@ pub struct Geometry {
 /// Topology of vertices without indices (glTF's `mode`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joined {
-    /// `TRIANGLE_STRIP`: each vertex forms a triangle with the two before it; every other triangle has the
-    /// opposite order.
+    /// `TRIANGLE_STRIP`: each vertex forms a triangle with the two before it. Every other triangle has the
+    /// reverse vertex order.
     Strip,
     /// `TRIANGLE_FAN`: each vertex forms a triangle with the previous one and the first.
     Fan,
@@ -72,7 +72,7 @@ impl Wrap {
 pub struct Camera {
     /// Position of the eye, metres.
     pub eye: Vec3,
-    /// Point in the centre of the picture, metres.
+    /// Point that is seen in the centre of the picture, metres.
     pub target: Vec3,
     /// Vertical field of view, radians.
     pub yfov: f64,
@@ -81,7 +81,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Axes of the camera's node: right, up and back. A glTF camera looks along -z of its node, with +y up.
+    /// Returns the axes x, y and z of the camera's node: right, up and back. A glTF camera looks along -z,
+    /// with +y up.
     fn axes(&self) -> [Vec3; 3] {
         let back = self.eye - self.target;
         // Unlike `normalize`, a division by the length leaves directions along coordinate axes exact.
@@ -148,7 +149,7 @@ impl SceneBuilder {
     pub fn geometry(&mut self, mesh: &Mesh) -> Geometry {
         let attributes = self.attributes(mesh);
         let indices = mesh.triangles.iter().flatten();
-        // The index 0xffff restarts a primitive, so that it cannot be that of a vertex.
+        // The index 0xffff means primitive restart, so that no vertex can have it.
         let (bytes, component): (Vec<u8>, u32) = if mesh.positions.len() <= 0xffff {
             (indices.flat_map(|&index| (index as u16).to_le_bytes()).collect(), UNSIGNED_SHORT)
         } else {
@@ -159,15 +160,15 @@ impl SceneBuilder {
         Geometry { attributes, indices, mode: None }
     }
 
-    /// Adds the vertices of a mesh without indices, which `joined` connects in their order. The triangles of
-    /// the mesh are ignored.
+    /// Adds the vertices of a mesh without indices. Their order and `joined` define the triangles; the
+    /// triangles of `mesh` are ignored.
     pub fn joined(&mut self, mesh: &Mesh, joined: Joined) -> Geometry {
         let attributes = self.attributes(mesh);
         Geometry { attributes, indices: None, mode: Some(joined.mode()) }
     }
 
-    /// Adds the attributes of a mesh's vertices. Normals share the accessor of the positions if they are
-    /// equal, as on a unit sphere.
+    /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share
+    /// their accessor.
     fn attributes(&mut self, mesh: &Mesh) -> PrimitiveAttributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
@@ -199,7 +200,7 @@ impl SceneBuilder {
         self.accessor(bytes, Some(ARRAY_BUFFER), FLOAT, count, kind)
     }
 
-    /// Adds an accessor of `count` elements that are no vertex attribute.
+    /// Adds an accessor of `count` elements that are not a vertex attribute.
     pub(crate) fn numbers(&mut self, values: &[f32], count: usize, kind: &'static str) -> usize {
         let bytes = values.iter().copied().flat_map(f32::to_le_bytes).collect();
         self.accessor(bytes, None, FLOAT, count, kind)
@@ -232,7 +233,7 @@ impl SceneBuilder {
         self.document.buffer_views.len() - 1
     }
 
-    /// Adds a mesh; returns its index. Each part is a geometry with the index of its material.
+    /// Adds a mesh; returns its index. Each of `parts` is a geometry and the index of its material.
     pub fn mesh(&mut self, name: &str, parts: &[(Geometry, usize)]) -> usize {
         let primitives = parts.iter().map(|&(geometry, material)| Primitive {
             attributes: geometry.attributes,
@@ -258,19 +259,19 @@ impl SceneBuilder {
         index
     }
 
-    /// Adds a mesh with a material, and a root node for it. Both have this name.
+    /// Adds a mesh with a material, and a root node for the mesh. Both have the name `name`.
     pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) {
         let geometry = self.geometry(mesh);
         self.placed(name, geometry, material);
     }
 
-    /// [`Self::object`] for a geometry that is in the file already.
+    /// Does the same as [`Self::object`] for a geometry that is already in the file.
     pub fn placed(&mut self, name: &str, geometry: Geometry, material: usize) {
         let mesh = Some(self.mesh(name, &[(geometry, material)]));
         self.root(Node { name: name.into(), mesh, ..Node::default() });
     }
 
-    /// Adds a camera and a root node for it. Both have this name.
+    /// Adds a camera and a root node for the camera. Both have the name `name`.
     pub fn camera(&mut self, name: &str, camera: &Camera) {
         let index = self.lens(name, camera);
         let matrix = Some(camera.matrix());

@@ -1,7 +1,7 @@
 //! Subset of the JSON of glTF 2.0 that the scenes use.
 //!
-//! Plain structs replace `serde_json::Value`, so that the order of keys, and thus every byte of the file,
-//! does not depend on the features of `serde_json`.
+//! Structs instead of `serde_json::Value` fix the order of keys, which would otherwise depend on the features
+//! of `serde_json`.
 
 use serde::Serialize;
 
@@ -52,7 +52,7 @@ pub(crate) struct Roots {
     pub(crate) nodes: Vec<usize>,
 }
 
-/// Node of the hierarchy: a mesh, a camera or a light, with its transform and its children.
+/// Node of the scene graph: a mesh, a camera or a light, with its transform and its children.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Node {
     pub(crate) name: String,
@@ -140,7 +140,7 @@ pub(crate) struct MaterialEntry {
 }
 
 impl MaterialEntry {
-    /// Name of the extension `KHR_texture_transform`, if the material uses it.
+    /// Returns `KHR_texture_transform` if the material uses this extension.
     pub(crate) fn transform_extension(&self) -> Option<&'static str> {
         let textures = [self.pbr_metallic_roughness.base_color_texture, self.emissive_texture];
         let is_there = textures.iter().flatten().any(|texture| texture.extensions.is_some());

@@ -1,6 +1,6 @@
-//! White furnace: a closed cube whose walls emit and reflect equally.
+//! White furnace test: a closed cube whose walls all have the same emission and albedo.
 //!
-//! Radiance is uniform in every position and direction: `L = 1 + 0.5 L`, so `L = 2`.
+//! The radiance `L` is equal at every position and in every direction: `L = 1 + 0.5 L`, so `L = 2`.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::builder::{Camera, SceneBuilder};
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// Cube that faces inwards, because the corners of the box are swapped.
+/// Cube whose faces point inwards, because its two corners are swapped.
 fn room() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.cuboid(Vec3::ONE, Vec3::NEG_ONE);

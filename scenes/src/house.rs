@@ -1,5 +1,5 @@
-//! House of one room with a window, on open ground, to be lit by an environment map. Most of the sky's light
-//! does not reach the window.
+//! House of one room with a window, on open ground, to be lit by an environment map. Only a small part of the
+//! sky's light reaches the window.
 
 use glam::Vec3;
 
@@ -9,8 +9,8 @@ use crate::mesh::Mesh;
 
 /// Lower and upper corner of the room, metres.
 const ROOM: [Vec3; 2] = [Vec3::new(-2.5, 0.0, -2.0), Vec3::new(2.5, 2.6, 2.0)];
-/// Lower and upper corner of the window (x and y), metres. The window is in the wall towards -z, on the side
-/// of the sun of `sky.exr`.
+/// Lower and upper corner of the window (x and y), metres. The window is in the wall towards -z, which faces
+/// the sun of `sky.exr`.
 const WINDOW: [[f32; 2]; 2] = [[-0.9, 0.9], [0.5, 2.1]];
 /// Thickness of walls, floor and ceiling, metres.
 const THICKNESS: f32 = 0.2;
@@ -25,7 +25,7 @@ const FURNITURE: [[[f32; 3]; 2]; 4] = [
     [[-2.4, 0.0, 1.3], [-1.3, 0.9, 1.9]],
 ];
 
-/// Scene as a `.glb` file.
+/// Returns the scene as a `.glb` file.
 pub(crate) fn house() -> Vec<u8> {
     let mut scene = SceneBuilder::default();
     let ground = scene.material(&Material::diffuse("ground", [0.25, 0.28, 0.16]));
@@ -61,7 +61,7 @@ fn lawn() -> Mesh {
     mesh
 }
 
-/// Walls and ceiling. The wall with the window consists of four parts around it.
+/// Walls and ceiling. The wall with the window consists of four boxes around the window.
 fn walls() -> Mesh {
     let [lower, upper] = ROOM;
     let [inner, outer] = [lower, upper + THICKNESS];

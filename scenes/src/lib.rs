@@ -1,7 +1,7 @@
 //! Generators of the scenes that ship with photoncard.
 //!
 //! [`scenes`] returns all files, with equal bytes on every machine. A test compares them with the files in
-//! the folder of this crate, whose `README.md` describes each scene.
+//! the folder of this crate. The folder's `README.md` describes each scene.
 //!
 //! | module | contents |
 //! |---|---|
@@ -29,7 +29,7 @@ mod roughness;
 mod sky;
 mod sphere;
 
-/// File of a scene or an environment.
+/// File of a scene or an environment map.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     /// Name of the file, without a folder.
@@ -38,7 +38,7 @@ pub struct SceneFile {
     pub bytes: Vec<u8>,
 }
 
-/// All scenes, and the sky that lights `atrium-open.glb` and `house.glb`.
+/// Returns all scenes, and the environment map that lights `atrium-open.glb` and `house.glb`.
 pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },

@@ -1,4 +1,5 @@
-//! Writes the shipped scenes into the folder of the first argument, by default the folder of this crate.
+//! Writes the shipped scenes into the folder that the first argument names, by default the folder of this
+//! crate.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

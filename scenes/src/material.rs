@@ -1,4 +1,4 @@
-//! Materials: reflection, transmission and emission of surfaces as in glTF.
+//! Materials of glTF: reflection, transmission and emission of surfaces.
 
 use crate::document::{
     EmissiveStrength, Extensions, Extras, IndexOfRefraction, MaterialEntry, MetallicRoughness, Phong,
@@ -21,7 +21,7 @@ pub struct Material {
     alpha_cutoff: Option<f64>,
 }
 
-/// Medium of a clear, smooth solid.
+/// Optical properties of a clear, smooth solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Glass {
     /// Index of refraction.
@@ -85,14 +85,15 @@ impl Material {
         self
     }
 
-    /// Cuts the surface out where the alpha of the base texture is below `cutoff`.
+    /// Makes the surface absent where the alpha of the base texture is below `cutoff`.
     #[must_use]
     pub fn cut_out(mut self, cutoff: f64) -> Self {
         self.alpha_cutoff = Some(cutoff);
         self
     }
 
-    /// glTF's `emissiveFactor`, at most 1, and for a higher radiance the strength that multiplies it.
+    /// Returns glTF's `emissiveFactor`, at most 1, and the `emissiveStrength` that multiplies it. The
+    /// strength is `None` for a radiance of at most 1.
     fn emission(&self) -> (Option<[f64; 3]>, Option<EmissiveStrength>) {
         let peak = self.radiance.into_iter().fold(0.0, f64::max);
         if peak == 0.0 {

@@ -12,7 +12,7 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Indices of the three vertices of each triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normals of the vertices; empty for a flat surface.
+    /// Unit normals of the vertices; empty if the mesh is flat-shaded.
     pub normals: Vec<Vec3>,
     /// Texture coordinates of the vertices, the second one downwards; empty without a texture.
     pub coordinates: Vec<Vec2>,
@@ -32,7 +32,7 @@ impl Mesh {
         (self.positions.len() - 1) as u32
     }
 
-    /// Adds a triangle unless two of its corners coincide, as they do at a pole.
+    /// Adds a triangle unless two of its corners coincide (at the pole of a surface of revolution).
     fn triangle(&mut self, corners: [u32; 3]) {
         let [a, b, c] = corners.map(|index| self.positions[index as usize]);
         if a != b && b != c && c != a {
@@ -40,7 +40,8 @@ impl Mesh {
         }
     }
 
-    /// Adds a quadrilateral of two triangles, divided from its first to its third vertex.
+    /// Adds two triangles that form a quadrilateral, divided along the diagonal from its first to its third
+    /// vertex.
     fn quad_between(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangle([a, b, c]);
         self.triangle([a, c, d]);
@@ -52,7 +53,7 @@ impl Mesh {
         self.quad_between(corners);
     }
 
-    /// [`Self::quad`] with texture coordinates. Either all or no vertices of a mesh must have them.
+    /// Adds a [`Self::quad`] with texture coordinates. Either all or no vertices of a mesh must have them.
     pub fn textured_quad(&mut self, corners: [Vec3; 4], coordinates: [[f32; 2]; 4]) {
         self.quad(corners);
         self.coordinates.extend(coordinates.map(Vec2::from_array));
@@ -64,7 +65,7 @@ impl Mesh {
         self.triangle(corners);
     }
 
-    /// Adds an upright prism: sides, top and bottom. `footprint` has x and z of the corners,
+    /// Adds an upright prism: sides, top and bottom. `footprint` has the (x, z) of each corner,
     /// counter-clockwise seen from above.
     pub fn prism(&mut self, footprint: [[f32; 2]; 4], bottom: f32, top: f32) {
         let at = |corner: usize, y: f32| Vec3::new(footprint[corner][0], y, footprint[corner][1]);
@@ -87,13 +88,14 @@ impl Mesh {
     }
 
     /// Adds a grid of `columns` by `rows` vertices. `point` returns the position of the vertex of a column
-    /// and a row. The front of the grid is on the side of the cross product of a step to the next column and
-    /// a step to the next row. `wrap` joins the last column to the first, the last row to the first, or both.
+    /// and a row. The front normal is the cross product of the step to the next column and the step to the
+    /// next row. `wrap` joins the last column to the first, the last row to the first, or both.
     pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
         self.grid_cut(size, wrap, point, |_, _| false);
     }
 
-    /// [`Self::grid`] whose cells are divided along the other diagonal where `other_cut` returns true.
+    /// Adds a [`Self::grid`] whose cells are divided along the other diagonal where `other_cut(column, row)`
+    /// is true.
     pub fn grid_cut(
         &mut self,
         [columns, rows]: [usize; 2],
@@ -123,13 +125,13 @@ impl Mesh {
     }
 
     /// Adds a surface of revolution about the y axis. `profile` has a radius and a height for each row of
-    /// vertices. Where it leads upwards, the surface faces away from the axis. If it begins and ends on the
-    /// axis, the solid is closed.
+    /// vertices. Where the profile leads upwards, the surface faces away from the axis. If the profile begins
+    /// and ends on the axis, the surface is closed.
     pub fn lathe(&mut self, segments: usize, profile: &[[f32; 2]]) {
         self.fluted_lathe(segments, profile, |_, _| 1.0);
     }
 
-    /// [`Self::lathe`] with the radius scaled by `flute(segment, row)`.
+    /// Adds a [`Self::lathe`] whose radius at each vertex is multiplied by `flute(segment, row)`.
     pub fn fluted_lathe(
         &mut self,
         segments: usize,
@@ -154,7 +156,7 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|index| first + index)));
     }
 
-    /// Rotates the mesh by a quarter turn about the y axis, from +z towards +x.
+    /// Rotates the mesh by 90 degrees about the y axis, from +z towards +x.
     #[must_use]
     pub fn quarter_turn(mut self) -> Self {
         for p in &mut self.positions {
@@ -166,7 +168,7 @@ impl Mesh {
         self
     }
 
-    /// Computes the normal of each vertex as the area-weighted mean of the triangles around it.
+    /// Computes the normal of each vertex as the area-weighted mean of the normals of its triangles.
     #[must_use]
     pub fn smooth(mut self) -> Self {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
@@ -187,7 +189,7 @@ impl Mesh {
     }
 }
 
-/// Point at `index / count` of the unit circle, from +x towards +y.
+/// Returns the point of the unit circle at the angle `2 pi index / count` from +x towards +y.
 pub fn on_circle(index: usize, count: usize) -> Vec2 {
     let angle = core::f32::consts::TAU * index as f32 / count as f32;
     Vec2::new(libm::cosf(angle), libm::sinf(angle))

@@ -1,4 +1,4 @@
-//! Animations, cameras and lights on nodes that move, skins, and morph targets.
+//! Builder methods for animations, cameras and lights on moving nodes, skins, and morph targets.
 
 use glam::{Mat4, Quat, Vec3};
 
@@ -19,7 +19,7 @@ pub(crate) enum Between {
     Smooth,
 }
 
-/// Animated property of a node, with its value at each keyframe.
+/// Animated property of a node: its values at all keyframes.
 pub(crate) enum Values {
     Translations(Vec<Vec3>),
     Rotations(Vec<Quat>),
@@ -27,7 +27,7 @@ pub(crate) enum Values {
     Weights(Vec<f32>),
 }
 
-/// Property of a node at equidistant keyframes, from time 0.
+/// Animation of one property of a node, with equidistant keyframes from time 0.
 pub(crate) struct Track {
     pub(crate) node: usize,
     pub(crate) values: Values,
@@ -53,7 +53,6 @@ impl Values {
         }
     }
 
-    /// Components of each value.
     fn components(&self) -> Vec<Vec<f32>> {
         match self {
             Self::Translations(values) => values.iter().map(|value| value.to_array().to_vec()).collect(),
@@ -63,7 +62,7 @@ impl Values {
     }
 }
 
-/// Rotations whose signs are chosen so that consecutive quaternions are close.
+/// Returns the rotations, with the quaternions' signs chosen so that consecutive quaternions are close.
 fn on_one_side(rotations: &[Quat]) -> impl Iterator<Item = Quat> {
     rotations.iter().scan(None, |before: &mut Option<Quat>, &rotation| {
         let is_opposite = before.is_some_and(|before| before.dot(rotation) < 0.0);
@@ -72,7 +71,7 @@ fn on_one_side(rotations: &[Quat]) -> impl Iterator<Item = Quat> {
     })
 }
 
-/// In-tangent, value and out-tangent of each keyframe.
+/// Returns in-tangent, value and out-tangent of each keyframe, as `CUBICSPLINE` needs them.
 fn with_tangents(values: &[Vec<f32>], interval: f32) -> Vec<f32> {
     let last = values.len() - 1;
     let keyframe = |index: usize| {
@@ -125,7 +124,7 @@ impl SceneBuilder {
         })
     }
 
-    /// Adds a point light with `intensity` in W/sr. Returns the extension for the node at which the light is.
+    /// Adds a point light with `intensity` in W/sr. Returns the extension that places the light at a node.
     pub(crate) fn point_light(&mut self, name: &str, color: [f64; 3], intensity: f64) -> NodeExtensions {
         let extensions = &mut self.document.extensions;
         let lights =
@@ -134,8 +133,8 @@ impl SceneBuilder {
         NodeExtensions { light: LightIndex { light: lights.len() - 1 } }
     }
 
-    /// Adds a skin; returns its index. Each of `joints` has the index of its node and its position in the
-    /// bind pose, metres.
+    /// Adds a skin and returns its index. `joints` holds the index of each joint's node, and the joint's
+    /// position in the bind pose, metres.
     pub(crate) fn skin(&mut self, joints: &[(usize, Vec3)]) -> usize {
         let inverse = joints.iter().flat_map(|(_, place)| Mat4::from_translation(-*place).to_cols_array());
         let inverse: Vec<f32> = inverse.map(|number| number + 0.0).collect();
@@ -145,8 +144,8 @@ impl SceneBuilder {
         self.document.skins.len() - 1
     }
 
-    /// Binds vertices to the first two joints of a skin. For each vertex, `shares` has the weight of the
-    /// second joint; the first has the rest of 1.
+    /// Binds vertices to the first two joints of a skin. `shares` holds, for each vertex, the weight `w` of
+    /// the second joint; the first joint has `1 - w`.
     pub(crate) fn hung(&mut self, mut geometry: Geometry, shares: &[f32]) -> Geometry {
         geometry.attributes.joints_0 = Some(self.joints(&vec![[0, 1, 0, 0]; shares.len()]));
         let weights = shares.iter().map(|share| [1.0 - share, *share, 0.0, 0.0]);

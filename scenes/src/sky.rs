@@ -14,8 +14,8 @@ const ZENITH: Vec3 = Vec3::new(0.30, 0.62, 1.40);
 const HORIZON: Vec3 = Vec3::new(1.35, 1.50, 1.70);
 const GROUND: Vec3 = Vec3::new(0.22, 0.19, 0.15);
 
-/// Direction of the sun, the radiance at its centre, W/(sr m^2), and the angle from it at which the radiance
-/// has fallen to `1/e`, radians.
+/// Direction of the sun, the radiance at its centre, W/(sr m^2), and the angle from the centre at which the
+/// radiance has fallen to `1/e`, radians.
 const SUN: Vec3 = Vec3::new(-0.55, 0.75, -0.6);
 const SUN_RADIANCE: Vec3 = Vec3::new(1100.0, 900.0, 620.0);
 const SUN_WIDTH: f32 = 0.06;
@@ -29,7 +29,7 @@ fn radiance(direction: Vec3) -> Vec3 {
     HORIZON.lerp(ZENITH, from_horizon) + SUN_RADIANCE * libm::expf(-angle * angle)
 }
 
-/// Direction of the centre of a texel.
+/// Returns the unit direction of the centre of a texel.
 fn direction(column: usize, row: usize) -> Vec3 {
     let [u, v] =
         [(column, SIZE[0]), (row, SIZE[1])].map(|(place, count)| (place as f32 + 0.5) / count as f32);
@@ -38,7 +38,7 @@ fn direction(column: usize, row: usize) -> Vec3 {
     Vec3::new(sine * libm::sinf(phi), cosine, -sine * libm::cosf(phi))
 }
 
-/// Map as an `OpenEXR` file with half-precision samples.
+/// Returns the map as an `OpenEXR` file with half-precision samples.
 pub(crate) fn sky() -> Vec<u8> {
     let channels = SpecificChannels::rgb(|place: exr::prelude::Vec2<usize>| {
         let [red, green, blue] = radiance(direction(place.x(), place.y())).to_array().map(f16::from_f32);

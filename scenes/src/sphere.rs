@@ -31,8 +31,8 @@ const FACES: [[u32; 3]; 20] = [
     [9, 8, 1],
 ];
 
-/// Smooth unit sphere about the origin: an icosahedron whose triangles are divided into four, `subdivisions`
-/// times.
+/// Smooth unit sphere about the origin: an icosahedron in which each triangle is divided into four,
+/// `subdivisions` times.
 pub(crate) fn icosphere(subdivisions: u32) -> Mesh {
     let mut mesh = icosahedron();
     for _ in 0..subdivisions {

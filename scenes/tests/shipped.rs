@@ -1,4 +1,4 @@
-//! Shipped scenes equal the generators' output, and are valid.
+//! Tests that the shipped scenes equal the generators' output, and are valid.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use gltf::buffer::Source;
 use gltf::mesh::Mode;
 use gltf::{Gltf, Node, Primitive};
 
-/// Name of each scene, the range of its number of triangles, and its cameras.
+/// Name, range of the number of triangles, and cameras of each scene.
 const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 12] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
@@ -41,7 +41,7 @@ fn binary(file: &Gltf) -> Vec<u8> {
     }
 }
 
-/// Vertices of each triangle of a primitive.
+/// Returns the vertex indices of each triangle of a primitive.
 fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator<Item = [u32; 3]> + 'a> {
     match primitive.mode() {
         Mode::Triangles => Box::new(indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]])),
@@ -51,7 +51,7 @@ fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator
     }
 }
 
-/// Adds the triangles of a node and its descendants in world space.
+/// Appends the world-space triangles of a node and its descendants to `triangles`.
 fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3; 3]>) {
     let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
     for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {

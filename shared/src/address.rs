@@ -13,15 +13,15 @@ impl Line {
     /// A line of zero bytes.
     pub const ZERO: Self = Self([0; LINE_BYTES]);
 
-    /// Record number `slot` of the line: `N` bytes, packed from the start of the line. `None` past the last
-    /// whole record.
+    /// Returns record `slot` of a line that holds records of `N` bytes, packed from its start. `None` past
+    /// the last whole record.
     #[inline(always)]
     pub fn record<const N: usize>(&self, slot: usize) -> Option<&[u8; N]> {
         self.0.as_chunks::<N>().0.get(slot)
     }
 
-    /// Record number `slot` of the line, mutable: `N` bytes, packed from the start of the line. `None` past
-    /// the last whole record.
+    /// Returns record `slot`, mutable, of a line that holds records of `N` bytes, packed from its start.
+    /// `None` past the last whole record.
     pub fn record_mut<const N: usize>(&mut self, slot: usize) -> Option<&mut [u8; N]> {
         self.0.as_chunks_mut::<N>().0.get_mut(slot)
     }
@@ -31,8 +31,8 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LineAddress(pub u32);
 
-/// Data structure that a line belongs to. Memory traffic is counted per structure; the structure also decides
-/// whether a line goes through the photon cache or the scene cache.
+/// Data structure that a line belongs to. Memory traffic is counted per structure. Lines of photon structures
+/// go through the photon cache, other lines through the scene cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Structure {
@@ -47,13 +47,13 @@ pub enum Structure {
     /// Lights and the distributions from which they are sampled: emitters, the light tree, distant lights,
     /// and the environment's distribution.
     Emitters = 4,
-    /// Inner nodes ([`crate::layout::PhotonNode`]) of a photon map in the line layout.
+    /// Inner nodes ([`crate::layout::PhotonNode`]) of a photon map that is a wide tree.
     PhotonNodes = 5,
-    /// Photons of the photon map: leaves of the line layout, or nodes of the kd-tree.
+    /// Photons of the photon map: leaves of the wide tree, or nodes of a kd-tree.
     Photons = 6,
-    /// Inner nodes of the tree of irradiance points.
+    /// Inner nodes of the tree in which irradiance points are searched.
     IrradianceNodes = 7,
-    /// Irradiance points.
+    /// Points with precomputed irradiance (Christensen 1999).
     IrradiancePoints = 8,
     /// Inner nodes of the caustic map.
     CausticNodes = 9,
@@ -63,7 +63,8 @@ pub enum Structure {
     Attributes = 11,
     /// Texture records and texels.
     Textures = 12,
-    /// Irradiance records that a chip keeps from one frame to the next, in the lines after the card image.
+    /// Records of the irradiance cache that a chip keeps from one frame to the next, in the lines after the
+    /// card image.
     IrradianceRecords = 13,
 }
 
@@ -89,7 +90,8 @@ impl Structure {
         Self::IrradianceRecords,
     ];
 
-    /// Returns true for structures of a photon map or of the irradiance points, false for those of the scene.
+    /// Returns true for the photon map, the caustic map and the irradiance points, false for structures of
+    /// the scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
         matches!(
@@ -108,13 +110,13 @@ impl Structure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stage {
-    /// Work before the tiles of a frame: the header of a loaded card image is read.
+    /// Work before the first tile of a frame: reads the header of the card image.
     Begin = 0,
     /// Eye rays.
     Eye = 1,
-    /// Survey rays of irradiance records.
+    /// Rays that survey the surroundings of irradiance cache records.
     Survey = 2,
-    /// Photon gathers for direction tables (importance sampling).
+    /// Photon gathers for the tables from which directions of gather rays are importance-sampled.
     Table = 3,
     /// Shadow rays.
     Shadow = 4,

@@ -1,4 +1,4 @@
-//! Capacities of a chip, as a card reports them to its host, and limits that hold for every kind of chip.
+//! Capacities of a chip, which a card reports to its host, and limits for all kinds of chips.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,22 +19,24 @@ pub struct Budget {
     pub scene_cache_bytes: u32,
     /// On-chip memory that the call stack takes, bytes.
     pub stack_bytes: u32,
-    /// Maximum number of pixels of a tile, in a picture without layers.
+    /// Maximum number of pixels of a tile, in a picture without layers (separate direct, indirect and caustic
+    /// light).
     pub tile_pixels: u32,
     /// Maximum k of a search for the k nearest photons.
     pub neighbors: u32,
     /// Maximum of [`FrameParameters::gather_rays`](crate::message::FrameParameters::gather_rays).
     pub gather_rays: u32,
-    /// Capacity of the gather queue (deferred reordering), gathers.
+    /// Capacity of the queue in which photon gathers wait to be reordered, gathers.
     pub gather_queue: u32,
-    /// Maximum number of irradiance records of one block of a tile; a power of two.
+    /// Maximum number of irradiance cache records of a block; a power of two. A tile that needs more is
+    /// divided into blocks.
     pub irradiance_records: u32,
     /// Maximum number of shadow rays of a sample.
     pub shadow_rays: u32,
     /// Maximum number of samples of a pixel.
     pub samples: u32,
-    /// Maximum number of tile commands that a chip holds, waiting or in flight. The host sends no more before
-    /// a tile is complete.
+    /// Maximum number of tiles that a chip holds, waiting or in flight. At this number, the host sends no
+    /// tile before another is complete.
     pub tiles: u32,
     /// Maximum number of tiles in flight. A tile is in flight until its last gather is done, so several tiles
     /// can wait for gathers at once.
@@ -89,19 +91,20 @@ pub const BVH_STACK: usize = 160;
 /// Maximum depth of the photon kd-tree, in levels: 2^27 photons.
 pub const KD_TREE_LEVELS: usize = 27;
 
-/// Number of stack entries for a search in a photon map with leaves. The host builds no tree that needs more.
+/// Number of stack entries for a search in a photon map that is a wide tree. The host builds no tree that
+/// needs more.
 pub const PHOTON_STACK: usize = 160;
 
-/// Number of candidates at which a search for the k = `neighbors` nearest photons drops all candidates but
-/// the k nearest. A lower number shrinks the search radius sooner, but takes more selections.
+/// Returns the number of candidates at which a search for the k = `neighbors` nearest photons selects the k
+/// nearest and drops the others. A lower number shrinks the search radius sooner, but causes more selections.
 pub const fn selected_candidates(neighbors: u32) -> usize {
     const MIN_BEYOND: usize = 32;
     let beyond = neighbors as usize * 3 / 5;
     neighbors as usize + if beyond < MIN_BEYOND { MIN_BEYOND } else { beyond }
 }
 
-/// Capacity for candidates of a search for the `neighbors` nearest photons: `selected_candidates(neighbors)`
-/// plus [`LEAF_LANES`], since the lanes of one leaf are tested together.
+/// Returns the capacity, in candidates, of the buffer of a search for the `neighbors` nearest photons. It is
+/// `selected_candidates(neighbors)` plus [`LEAF_LANES`], because the photons of one leaf are added together.
 pub const fn gather_candidates(neighbors: u32) -> usize {
     selected_candidates(neighbors) + LEAF_LANES
 }

@@ -1,9 +1,9 @@
-//! Checksums of frames and of card images. Their polynomials differ, so that an error that one of them misses
-//! is detected by the other.
+//! Checksums of frames (packets on the link) and of card images (scenes in card memory). Their polynomials
+//! differ: an error that is a multiple of one polynomial is detected by the checksum with the other.
 //!
-//! Frames have [`Checksum`]: CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005), which takes
-//! sixteen bytes at a time with one table per byte position. Card images and their chunks have
-//! [`ImageChecksum`]: CRC-64/XZ (ECMA-182) by slicing-by-8.
+//! Frames use [`Checksum`]: CRC-32C (Castagnoli), computed by slicing-by-16 (Kounavis, Berry 2005). It
+//! processes sixteen bytes at a time with one table per byte position. Card images and their chunks use
+//! [`ImageChecksum`]: CRC-64/XZ (ECMA-182), computed by slicing-by-8.
 
 use crate::address::Line;
 
@@ -57,7 +57,6 @@ const fn narrowed<const PLACES: usize>(wide: [[u64; 256]; PLACES]) -> [[u32; 256
     tables
 }
 
-/// Entry `byte` of a table.
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256: the compiler drops the check")]
 #[inline(always)]
 fn look_up<T: Copy>(table: &[T; 256], byte: u8) -> T {

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. Except for [`Self::drains`] and [`Self::most_waiting`], the sums over all tiles do
-/// not depend on which chip rendered which tile, unless chips keep irradiance records
+/// Work done on a tile. The sums over all tiles do not depend on which chip rendered which tile, with two
+/// exceptions: [`Self::drains`] and [`Self::most_waiting`] always depend on it, and all counters do if chips
+/// keep irradiance records
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
@@ -27,14 +28,14 @@ pub struct Counters {
     pub caustic_gathers: u64,
     /// Searches for the k nearest photons in the photon map.
     pub gathers: u64,
-    /// Searches of [`Self::gathers`] that were made for direction tables (importance sampling).
+    /// Searches of [`Self::gathers`] made to build tables for importance sampling of directions.
     pub tables: u64,
     /// Irradiance records computed by a final gather.
     pub records: u64,
-    /// Irradiance records read back from an earlier frame instead of being gathered.
+    /// Irradiance records reused from an earlier frame instead of being gathered.
     pub kept_records: u64,
-    /// Paths that see a surface with a Lambertian part, in a frame with final gather rays. A sample is one
-    /// path, with adaptive sampling up to 16.
+    /// Paths that see a surface with a Lambertian component, in a frame with final gather rays. A sample has
+    /// one path, with adaptive sampling up to 16.
     pub lambertian_samples: u64,
     /// Paths of [`Self::lambertian_samples`] whose indirect irradiance was interpolated between irradiance
     /// records.
@@ -51,8 +52,8 @@ pub struct Counters {
     pub distances_compared: u64,
     /// Photons that searches returned: k each, or fewer if fewer lie within the maximum distance.
     pub photons_found: u64,
-    /// Photons found by gathers at surfaces with a lobe, which is evaluated for the direction of each photon.
-    /// Gathers in the caustic map are included.
+    /// Photons found by gathers at surfaces with a Phong or GGX lobe, which is evaluated for each photon's
+    /// direction. Gathers in the caustic map are included.
     pub photons_reflected: u64,
     /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model (GGX).
     pub photons_on_microfacets: u64,
@@ -62,9 +63,9 @@ pub struct Counters {
     pub lookups: u64,
     /// Irradiance points whose distance to a search's position was computed.
     pub points_tested: u64,
-    /// Drains of the gather queue.
+    /// Number of times that the gather queue was emptied (drained).
     pub drains: u64,
-    /// Maximum number of gathers that waited at the same time on one chip.
+    /// Maximum number of gathers that were queued at the same time on one chip.
     pub most_waiting: u64,
 }
 

@@ -5,9 +5,9 @@
 //! before: u32 ) 0x00
 //! ```
 //!
-//! Numbers are little-endian. A frame contains no zero byte, by byte stuffing ([`crate::stuffing`]), so that
-//! a receiver finds the next frame after any damage. [`crate::transport`] defines the meaning of the numbers
-//! in the header.
+//! Numbers are little-endian. Byte stuffing ([`crate::stuffing`]) removes all zero bytes before the
+//! terminator, so that a receiver finds the next frame after any damage. [`crate::transport`] defines the
+//! meaning of the numbers in the header.
 
 use core::fmt;
 
@@ -63,10 +63,10 @@ pub enum FrameKind {
     Data = 0,
     /// A message that begins a session.
     Open = 1,
-    /// An acknowledgement alone.
+    /// An acknowledgement without a message.
     Acknowledge = 2,
-    /// A request for an [`Self::Answer`]. Messages that the probe's receiver has sent under numbers below the
-    /// probe's sequence number are lost, unless the probe acknowledges them.
+    /// A request for an [`Self::Answer`], which also reports losses: the receiver's messages with numbers
+    /// below the probe's sequence number are lost, unless the probe acknowledges them.
     Probe = 3,
     /// Reply to a probe. Its sequence number is that of the sender's next message.
     Answer = 4,
@@ -88,12 +88,12 @@ pub struct FrameHeader {
     pub kind: FrameKind,
     /// Number of the frame's session.
     pub session: u32,
-    /// Number of this frame's message among those of its direction, modulo 2^16. In an answer it is the
-    /// number of the sender's next message, in a probe the bound described at [`FrameKind::Probe`], and in
-    /// other frames without a message 0.
+    /// Number of this frame's message in its direction, modulo 2^16. An answer has the number of the sender's
+    /// next message, a probe the bound described at [`FrameKind::Probe`]. Other frames without a message have
+    /// 0.
     pub sequence: u16,
-    /// Number of the message of the other direction that the frame's sender takes next. The sender has taken
-    /// all messages before it.
+    /// Number of the next message of the other direction that the frame's sender expects. It has taken all
+    /// messages before.
     pub acknowledged: u16,
     /// Bit `i` is set if message `acknowledged + i` of the other direction has arrived.
     pub held: u8,
@@ -136,7 +136,7 @@ pub struct Frame<'a> {
     pub payload: &'a [u8],
 }
 
-/// Reader of the frames that arrive from one direction.
+/// Decoder of the frames that arrive on a link.
 pub struct FrameReader {
     /// Bytes of the current frame, without its terminating zero.
     wire: Vec<u8, { MAX_FRAME - 1 }>,

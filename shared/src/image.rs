@@ -1,8 +1,8 @@
-//! The card image: all that a chip reads of a scene, in lines of card memory.
+//! The card image: the scene data that a chip reads, in lines of card memory.
 //!
 //! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of
-//! sections. A section is a run of lines with records of one kind ([`crate::layout`]). Each line holds as
-//! many whole records as fit; unused bytes are zero.
+//! sections. A section is a sequence of lines with records of one kind ([`crate::layout`]). Each line holds
+//! as many whole records as fit; unused bytes are zero.
 //!
 //! The photon map has one of two layouts: [`SectionKind::Photons`], or [`SectionKind::PhotonNodes`] with
 //! [`SectionKind::PhotonLeaves`]. The sections of the other layout are empty. Sections of irradiance points,
@@ -55,13 +55,14 @@ pub enum SectionKind {
     LightNodes = 9,
     /// [`DistantLight`]s.
     DistantLights = 10,
-    /// Distribution from which directions of the environment are sampled: `u32` thresholds of cumulative
-    /// distribution functions, in units of 2^-32. The marginal distribution of the rows comes first, then the
-    /// conditional distribution of the cells in each row; each ends with 2^32 - 1.
+    /// Distribution for importance sampling of directions to the environment, over a grid of cells. It
+    /// consists of cumulative distribution functions, as `u32` values in units of 2^-32. The marginal
+    /// function of the rows comes first, then for each row the conditional function of its cells. Each
+    /// function ends with 2^32 - 1.
     ///
-    /// If cells are subdivided, four further parts follow: the number of subdivided cells; the number n of
-    /// rows and columns that each is divided into; the row-major numbers of these cells, in increasing order;
-    /// and for each of these cells the distributions of its n rows and n x n parts, in the same form.
+    /// If cells are subdivided, four further parts follow: the number of subdivided cells; the number n such
+    /// that each is divided into n x n parts; the row-major numbers of these cells, in increasing order; and
+    /// for each of these cells the distributions of its n rows and n x n parts, in the same form.
     EnvironmentCells = 11,
     /// [`Photon`]s as a left-balanced kd-tree: the children of photon `i` are photons `2 i + 1` and
     /// `2 i + 2`.
@@ -72,8 +73,8 @@ pub enum SectionKind {
     PhotonLeaves = 14,
     /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
     CausticNodes = 15,
-    /// [`crate::layout::PhotonLeaf`]s of the caustic map, whose photons have followed paths `L S+ D`: one
-    /// bounce or more, all specular.
+    /// [`crate::layout::PhotonLeaf`]s of the caustic map. Its photons have followed paths `L S+ D`: one or
+    /// more specular bounces, then a diffuse surface.
     CausticLeaves = 16,
     /// [`crate::layout::PhotonNode`]s of the tree of irradiance points, the root first.
     IrradianceNodes = 17,
@@ -133,7 +134,7 @@ impl SectionKind {
         }
     }
 
-    /// Structure under which the section's lines are counted and cached.
+    /// Returns the structure to which the section's lines belong, for counters and caches.
     #[inline(always)]
     pub const fn structure(self) -> Structure {
         match self {
@@ -182,15 +183,15 @@ impl Section {
 pub struct Header {
     /// Number of lines of the card image, the header included.
     pub lines: u32,
-    /// Photon power unit of the photon map, W.
+    /// Unit of photon powers in the photon map, W.
     pub photon_power_unit: f32,
-    /// Photon power unit of the caustic map, W.
+    /// Unit of photon powers in the caustic map, W.
     pub caustic_power_unit: f32,
     /// Radiance unit, W/(sr m^2): a power of two. A pixel's sums of light are in steps of 2^-40 of this unit.
     pub radiance_unit: f32,
     /// Maximum magnitude of a coordinate of the scene, metres.
     pub reach: f32,
-    /// Grid on which the photons' positions lie. It may cover only a part of the scene.
+    /// Grid on which the photons' positions lie. It need not cover the whole scene.
     pub photon_grid: PhotonGrid,
     /// Probabilities of the kinds of lights, and parameters of the environment light.
     pub lights: Lights,
@@ -269,7 +270,7 @@ const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
 /// can grow towards them.
 const LIGHTS: usize = HEADER_BYTES - 32;
 const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
-/// Value stored as [`Lights::texture`] in a card image without an environment.
+/// Encoding of [`Lights::texture`] that stands for `None`.
 const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
@@ -285,7 +286,7 @@ impl Header {
         sections: [Section { first_line: 0, records: 0 }; SECTIONS],
     };
 
-    /// Section of the kind `kind`.
+    /// Returns the position and size of section `kind`.
     #[expect(clippy::indexing_slicing, reason = "a kind is below SECTIONS")]
     pub fn section(&self, kind: SectionKind) -> Section {
         self.sections[kind as usize]
@@ -373,7 +374,8 @@ impl Header {
         }
     }
 
-    /// Units of the sums in pixels: the radiance unit, and a photon grid cell as the unit of depth.
+    /// Returns the units of a pixel's sums: the radiance unit, and the side of a photon grid cell as the unit
+    /// of depth.
     pub fn sum_scale(&self) -> SumScale {
         SumScale { radiance: self.radiance_unit, depth: self.photon_grid.cell }
     }

@@ -1,6 +1,6 @@
 //! Wire and memory formats of photoncard, without any rendering.
 //!
-//! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`],
+//! The firmware and the host use this crate. It defines the contents of a card's memory ([`address`],
 //! [`layout`], [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`],
 //! [`transport`], [`frame`]).
 //!
@@ -47,7 +47,7 @@
 //! | [`frame`] | frame | header, payload, checksum |
 //! | [`transport`] | message | windowed acknowledgement, selective repetition |
 //! | [`message`] | message | commands of the host, replies of a card, faults |
-//! | [`counters`] | | counts of the work on a tile, which a card reports at the tile's end |
+//! | [`counters`] | | counts of the work on a tile, which a card reports when the tile is complete |
 //!
 //! [`hash`] is the hash from which all random numbers are made.
 //!
@@ -55,7 +55,7 @@
 //! implementations, `docs/glossary.md` defines the terms.
 #![forbid(unsafe_code)]
 #![no_std]
-// A chip never panics: these lints catch what could, and each exception gives its reason.
+// A chip must never panic: these lints warn of code that could, and each exception gives its reason.
 #![cfg_attr(
     not(test),
     warn(

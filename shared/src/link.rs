@@ -32,8 +32,8 @@ pub trait Port {
     /// If no more bytes can arrive.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError>;
 
-    /// Writes the first bytes of `bytes`, as many as there is room for, and returns their number. Returns 0
-    /// if there was no room within `wait`.
+    /// Writes as many of the first bytes of `bytes` as the device has room for, and returns their number.
+    /// Returns 0 if there was no room within `wait`.
     ///
     /// # Errors
     /// If no more bytes can be sent.

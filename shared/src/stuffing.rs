@@ -1,15 +1,15 @@
 //! Consistent overhead byte stuffing (COBS; Cheshire, Baker 1999): an encoding without zero bytes.
 //!
-//! The plain bytes are cut into pieces at every zero byte, which is dropped, and after 254 non-zero bytes in
-//! a row. A code byte, the piece's length plus one, precedes each piece. A code below 255 says that a zero
-//! byte follows its piece, except after the last piece.
+//! The plain bytes are cut into pieces at every zero byte, which is dropped, and after every 254 non-zero
+//! bytes in a row. A code byte, the piece's length plus one, precedes each piece. After a piece with a code
+//! below 255, unless it is the last, the decoder inserts the dropped zero byte.
 
 use heapless::Vec;
 
 /// Code of a piece of 254 bytes, the longest. No zero byte follows such a piece.
 const FULL: u8 = 0xff;
 
-/// Maximum length of `plain` bytes after stuffing.
+/// Returns the maximum length after stuffing of `plain` bytes.
 pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }
@@ -36,8 +36,8 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
                 code = place;
                 place += 1;
             }
-            // Zero bytes are unpredictable, so that no branch depends on them. A zero byte is written where
-            // the next code goes.
+            // No branch depends on whether a byte is zero, because it would be mispredicted. A zero byte is
+            // written to the position of the next code, which replaces it.
             *room.get_mut(place)? = byte;
             *room.get_mut(code)? = (place - code) as u8 + u8::from(byte != 0);
             code = if byte == 0 { place } else { code };

@@ -1,4 +1,4 @@
-//! Stuffing and checksums agree with independent implementations.
+//! Tests that stuffing and checksums agree with independent implementations.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::{Checksum, ImageChecksum, checksum, image_checksum};
@@ -92,7 +92,7 @@ proptest! {
 /// The frame checksum cannot detect an error that is a multiple of its own polynomial.
 #[test]
 fn the_image_checksum_detects_an_error_that_the_frame_checksum_misses() {
-    // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest
+    // The polynomial of CRC-32C has 33 bits. The lowest bit of a byte, the first on the link, is the highest
     // coefficient.
     let multiple = 1 | u64::from(0x82f6_3b78_u32) << 1;
     let (sound, mut damaged) = (Line([0x5a; LINE_BYTES]), Line([0x5a; LINE_BYTES]));

@@ -1,4 +1,4 @@
-//! Wire formats: frames arrive whole or not at all, and opcodes are pinned.
+//! Tests of the link's formats: frames arrive whole or not at all, and no opcode changes.
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::checksum;
@@ -36,7 +36,7 @@ fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
     wire.to_vec()
 }
 
-/// Returns all frames and errors of `bytes`, read in pieces of `piece` bytes.
+/// Decodes `bytes` in pieces of `piece` bytes. Returns all frames and errors.
 fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(FrameHeader, Vec<u8>), FrameError>> {
     let mut reader = FrameReader::new();
     let mut found = Vec::new();

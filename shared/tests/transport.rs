@@ -1,10 +1,10 @@
-//! Messages arrive once, whole and in order, whatever the link does to bytes.
+//! Tests that messages arrive once, whole and in order, whatever the link does to bytes.
 
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::transport::{Event, LineStatistics, Transport};
 use proptest::prelude::*;
 
-/// Random numbers of a seed.
+/// Pseudo-random number generator; the field is its state.
 struct Random(u64);
 
 impl Random {
@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-/// Mean numbers of a link's faults per million bytes.
+/// Mean numbers of a link's errors per million bytes.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
     flips: u64,
@@ -28,8 +28,8 @@ struct Faults {
 
 const NONE: Faults = Faults { flips: 0, drops: 0, repeats: 0 };
 
-/// Sends up to 699 of one end's pending bytes over a faulty link. Returns whether there were any, and the
-/// events at the other end.
+/// Sends up to 699 pending bytes from one end to the other over a faulty link. Returns whether a byte was
+/// sent, and the events at the receiving end.
 fn deliver(
     from: &mut Transport,
     to: &mut Transport,
@@ -74,7 +74,7 @@ fn message(number: usize, salt: usize) -> Vec<u8> {
     (0..length).map(|index| (index * 31 + number * 7 + salt) as u8).collect()
 }
 
-/// Sends `count` messages in each direction. Returns the statistics of host and card.
+/// Sends `count` messages in each direction and checks them. Returns the statistics of host and card.
 fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
     let mut random = Random(seed);
     let (mut host, mut card) = (Transport::host(), Transport::card());

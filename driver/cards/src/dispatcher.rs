@@ -1,4 +1,5 @@
-//! Transfers tiles: assignments from the scheduler to sessions, and finished tiles from sessions to sinks.
+//! Passes assignments of tiles from the scheduler to sessions, and finished tiles from sessions to sinks
+//! (film, files, display).
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
@@ -9,7 +10,8 @@ use photoncard_shared::message::Tile;
 use crate::scheduler::{Answered, CardNumber, Scheduler, SchedulerError, Standing};
 use crate::session::{Event, Session, SessionError};
 
-/// State that all sessions of a render share. A session may have its own thread, or share one with others.
+/// State that all sessions of a render share: the scheduler of the tiles, and the sinks of finished tiles. A
+/// session runs on a thread of its own, or on one that other sessions use too.
 pub struct Dispatcher<'a> {
     scheduler: Mutex<Scheduler>,
     /// Notified when a tile becomes available, a card is given up, or all tiles are done.
@@ -17,7 +19,7 @@ pub struct Dispatcher<'a> {
     sinks: Vec<&'a dyn TileSink>,
     /// Called before the sinks receive a tile from a card.
     rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync),
-    /// Held as a reader while sinks receive a tile, and as the writer while they revoke tiles.
+    /// Lock held for reading while sinks receive a tile, and for writing while they revoke tiles.
     order: RwLock<()>,
 }
 
@@ -39,13 +41,13 @@ impl<'a> Dispatcher<'a> {
         Self { rendered, ..self }
     }
 
-    /// Locks the scheduler of the render's tiles.
+    /// Locks and returns the scheduler.
     pub fn scheduler(&self) -> MutexGuard<'_, Scheduler> {
         // A poisoned lock is taken over: the panic that poisoned it ends the render.
         self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Assigns tiles to a card while it has a free credit. If the scheduler has no tile for the card, makes
+    /// Assigns tiles to a card as long as it accepts more. If the scheduler has no tile for the card, makes
     /// the card do the gathers that wait in its queue.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
@@ -119,8 +121,8 @@ impl<'a> Dispatcher<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Revokes those of its tiles
-    /// that no other card has confirmed.
+    /// Excludes a card from the render because it sent wrong messages, or wrong pixels of tile `about`. The
+    /// sinks revoke the card's tiles that no other card has confirmed.
     pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);
@@ -130,7 +132,7 @@ impl<'a> Dispatcher<'a> {
         self.changed.notify_all();
     }
 
-    /// Checks whether other cards have outvoted a card whose session has ended.
+    /// Checks, after a card's session has ended, whether other cards have contradicted its pixels of a tile.
     ///
     /// # Errors
     /// [`SessionError::Outvoted`] with the card's wrong tile, if other cards have outvoted the card.

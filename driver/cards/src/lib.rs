@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`link`] | ports of bytes: serial, sockets, pseudo terminals, loopback; injected faults |
 //! | [`session`] | greeting, upload, tiles and their checks, without I/O |
-//! | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
+//! | [`scheduler`], [`dispatcher`] | choice of a card for each tile; delivery of finished tiles to sinks |
 #![forbid(unsafe_code)]
 
 pub mod dispatcher;

@@ -1,15 +1,15 @@
 //! Removes noise from a picture by Intel Open Image Denoise (Áfra 2019), a neural network that reads
 //! radiance, albedo and normals.
 //!
-//! The library is not part of this program: [`Denoiser::find`] loads version 2 of it at run time, from the
-//! first of these places that has it:
+//! The library is not part of this program. [`Denoiser::find`] loads version 2 of it at run time, from the
+//! first of these locations that has it:
 //!
 //! 1. the file that the environment variable `PHOTONCARD_OIDN` names;
 //! 2. the folder of the program, and the folders `lib` in and beside it;
 //! 3. the package `pyoidn` of Python, in the active environment, the user's or the system's;
 //! 4. the library folders of the system.
 //!
-//! A denoised picture depends on the library's version and on the processor, by roundings. The film is not
+//! Rounding makes a denoised picture depend on the library's version and on the processor. The film is not
 //! changed.
 
 #![deny(unsafe_code)]
@@ -35,7 +35,8 @@ impl Denoiser {
     /// Loads the library.
     ///
     /// # Errors
-    /// [`DenoiseError::Missing`], and [`DenoiseError::Unusable`] for a file that is there but does not load.
+    /// [`DenoiseError::Missing`]; [`DenoiseError::Unusable`] if a file of the library does not load;
+    /// [`DenoiseError::Failed`] if the library cannot use the processor.
     pub fn find() -> Result<Self, DenoiseError> {
         if let Some(path) = places::stated() {
             return Self::open(path);
@@ -60,16 +61,18 @@ impl Denoiser {
         Ok(Self { library, version })
     }
 
-    /// Name and version of the library, such as `OIDN 2.5.1`.
+    /// Returns the name and version of the library, such as `OIDN 2.5.1`.
     pub fn version(&self) -> &str {
         &self.version
     }
 
-    /// Denoised radiance of a complete film, W/(sr m^2), row by row from the top of the crop window.
+    /// Returns the denoised radiance of a complete film, W/(sr m^2), row by row from the top of the crop
+    /// window.
     ///
-    /// Albedo and normals are denoised first, alone, and then guide the radiance as features without noise.
-    /// They have little noise: the smaller network of the library's quality *balanced* changes the picture's
-    /// error by 2 % at most. `threads` is the maximum number of threads; `None` for one a core.
+    /// Albedo and normals are denoised first, each alone, and then guide the denoising of the radiance. The
+    /// library's smaller network (quality *balanced*) denoises them, because they have little noise; it
+    /// changes the picture's error by 2 % at most. `threads` is the maximum number of threads; `None` for one
+    /// per core.
     ///
     /// # Errors
     /// [`DenoiseError::Incomplete`], [`DenoiseError::Stopped`] soon after `must_stop` returns true, and

@@ -10,8 +10,7 @@ use thiserror::Error;
 
 use crate::places::{FILE, VARIABLE};
 
-/// `OIDN_DEVICE_TYPE_CPU`. A processor of graphics would be faster, but rounds in ways of its own and may be
-/// busy.
+/// `OIDN_DEVICE_TYPE_CPU`. A GPU would be faster, but rounds differently and can be busy.
 const CPU: c_int = 1;
 /// `OIDN_FORMAT_FLOAT3`.
 const FLOAT3: c_int = 3;
@@ -22,10 +21,10 @@ type Handle = *mut c_void;
 /// `OIDNProgressMonitorFunction`: returns false to cancel the filter.
 type Monitor = unsafe extern "C" fn(*mut c_void, f64) -> bool;
 
-/// Tells whether work is no longer wanted. The library may ask on any of its threads.
+/// Function that returns true when the denoiser must stop. The library calls it on any of its threads.
 pub type MustStop<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// Quality of a filter, in exchange for its time.
+/// Quality of a filter; a higher quality takes more time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quality {
     /// `OIDN_QUALITY_BALANCED`: a smaller network, two to three times as fast.
@@ -36,7 +35,7 @@ pub(crate) enum Quality {
 
 /// Input of a filter.
 pub(crate) struct Input<'a> {
-    /// Images by their names in the library.
+    /// Name of each image in the library, and its pixels.
     pub(crate) images: &'a [(&'a str, &'a [[f32; 3]])],
     /// Names of boolean parameters that are true.
     pub(crate) switches: &'a [&'a str],
@@ -47,7 +46,7 @@ pub(crate) struct Input<'a> {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DenoiseError {
-    /// No place has the library.
+    /// No file of the library was found.
     #[error(
         "Open Image Denoise 2 is not on this machine; install it, such as by: pip install pyoidn, or name its file {} by {VARIABLE}",
         FILE
@@ -83,7 +82,7 @@ pub enum DenoiseError {
 /// Declares the functions that are used, by their names in C without the prefix `oidn`.
 macro_rules! functions {
     ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// The library, with the addresses of its functions.
+        /// The loaded library, with the addresses of its functions.
         pub(crate) struct Library {
             $($field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
             // The addresses hold as long as this is loaded.
@@ -119,7 +118,7 @@ functions! {
 }
 
 impl Library {
-    /// Loads a file; the error is the loader's.
+    /// Loads the library from a file. The error is the message of the operating system's loader.
     pub(crate) fn open(path: &Path) -> Result<Self, String> {
         // SAFETY: loading runs the library's initialisers, which its user has chosen to trust.
         let loaded = unsafe { Loaded::new(path) };
@@ -130,14 +129,14 @@ impl Library {
     }
 }
 
-/// A device of the library: this machine's processor.
+/// Device on which the library runs: this machine's processor.
 pub(crate) struct Device<'a> {
     library: &'a Library,
     handle: Handle,
 }
 
 impl<'a> Device<'a> {
-    /// Opens the processor, with at most `threads` threads; `None` for one a core.
+    /// Opens the processor for at most `threads` threads; `None` for one per core.
     pub(crate) fn new(library: &'a Library, threads: Option<usize>) -> Result<Self, DenoiseError> {
         // SAFETY: the function has no preconditions.
         let handle = unsafe { (library.new_device)(CPU) };
@@ -146,8 +145,8 @@ impl<'a> Device<'a> {
             return Err(device.error().unwrap_or_else(|| failed("it has no device")));
         }
         let threads = threads.and_then(|threads| c_int::try_from(threads).ok()).unwrap_or(0);
-        // SAFETY: the device is one, and the names end in 0. Threads are not bound to processors, since other
-        // work of this process may be on them.
+        // SAFETY: `handle` is a device, and the names end in 0. Threads are not bound to cores, because other
+        // threads of this process can be busy there.
         unsafe {
             (library.set_device_int)(handle, c"numThreads".as_ptr(), threads);
             (library.set_device_bool)(handle, c"setAffinity".as_ptr(), false);
@@ -159,12 +158,12 @@ impl<'a> Device<'a> {
 
     /// Name and version of the library.
     pub(crate) fn version(&self) -> String {
-        // SAFETY: the device is one, and the name ends in 0.
+        // SAFETY: `handle` is a device, and the name ends in 0.
         let version = unsafe { (self.library.device_int)(self.handle, c"version".as_ptr()) };
         format!("OIDN {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
     }
 
-    /// Filters images of `size` pixels.
+    /// Runs the filter on images of `size` (width, height) pixels. Returns the output image.
     pub(crate) fn run(
         &self,
         size: [usize; 2],
@@ -192,11 +191,11 @@ impl<'a> Device<'a> {
         self.error().map_or(Ok(()), Err)
     }
 
-    /// The first error since the last call, if there is one.
+    /// Returns the first error since the last call, if there is one.
     fn error(&self) -> Option<DenoiseError> {
         let mut message = ptr::null();
-        // SAFETY: a null device stands for the error of creating one. The message is valid until the next
-        // call.
+        // SAFETY: with a null device, the function returns the error of creating a device. The message is
+        // valid until the next call.
         let code = unsafe { (self.library.device_error)(self.handle, &raw mut message) };
         match code {
             0 => return None,
@@ -206,7 +205,7 @@ impl<'a> Device<'a> {
         if message.is_null() {
             return Some(failed("without a reason"));
         }
-        // SAFETY: it is a string of C.
+        // SAFETY: the message is a C string.
         Some(failed(&unsafe { CStr::from_ptr(message) }.to_string_lossy()))
     }
 }
@@ -214,7 +213,7 @@ impl<'a> Device<'a> {
 impl Drop for Device<'_> {
     fn drop(&mut self) {
         if !self.handle.is_null() {
-            // SAFETY: the device is one, and is not used again.
+            // SAFETY: `handle` is a device, and is not used again.
             unsafe { (self.library.release_device)(self.handle) }
         }
     }
@@ -229,7 +228,7 @@ struct Filter<'a> {
 
 impl<'a> Filter<'a> {
     fn new(device: &'a Device, size: [usize; 2]) -> Result<Self, DenoiseError> {
-        // SAFETY: the device is one; `RT` is the filter for rendered pictures.
+        // SAFETY: `handle` is a device; `RT` is the filter for rendered pictures.
         let handle = unsafe { (device.library.new_filter)(device.handle, c"RT".as_ptr()) };
         if handle.is_null() {
             return Err(device.error().unwrap_or_else(|| failed("it has no filter RT")));
@@ -237,14 +236,14 @@ impl<'a> Filter<'a> {
         Ok(Self { library: device.library, handle, size })
     }
 
-    /// Sets an image to read.
+    /// Sets the input image `name`.
     fn read(&mut self, name: &str, image: &'a [[f32; 3]]) {
         self.check_size(image);
-        // The library does not write to images but the output.
+        // The library writes to no image except the output.
         self.set_image(name, image.as_ptr().cast_mut().cast());
     }
 
-    /// Sets the image to write.
+    /// Sets the output image.
     fn write(&mut self, image: &'a mut [[f32; 3]]) {
         self.check_size(image);
         self.set_image("output", image.as_mut_ptr().cast());
@@ -265,23 +264,24 @@ impl<'a> Filter<'a> {
 
     fn switch_on(&mut self, name: &str) {
         let name = text(name);
-        // SAFETY: the filter is one.
+        // SAFETY: `handle` is a filter.
         unsafe { (self.library.set_filter_bool)(self.handle, name.as_ptr(), true) }
     }
 
     fn set_quality(&mut self, quality: Quality) {
-        // SAFETY: the filter is one, and the name ends in 0.
+        // SAFETY: `handle` is a filter, and the name ends in 0.
         unsafe { (self.library.set_filter_int)(self.handle, c"quality".as_ptr(), quality as c_int) }
     }
 
     fn execute(&mut self, must_stop: MustStop) {
-        /// Monitor whose data are a [`MustStop`].
+        /// Progress monitor: returns false when the filter must stop. `must_stop` points to a [`MustStop`].
         unsafe extern "C" fn goes_on(must_stop: *mut c_void, _share: f64) -> bool {
             // SAFETY: `execute` outlives the filter's work, and the closure may be called on any thread.
             let must_stop = unsafe { &*must_stop.cast::<MustStop>() };
             !must_stop()
         }
-        // SAFETY: the filter is one, its images are valid, and the monitor's data live until it has ended.
+        // SAFETY: `handle` is a filter, its images are valid, and the monitor's data live until the filter
+        // has ended.
         unsafe {
             (self.library.set_monitor)(self.handle, goes_on, (&raw const must_stop).cast_mut().cast());
             (self.library.commit_filter)(self.handle);
@@ -292,7 +292,7 @@ impl<'a> Filter<'a> {
 
 impl Drop for Filter<'_> {
     fn drop(&mut self) {
-        // SAFETY: the filter is one, and is not used again.
+        // SAFETY: `handle` is a filter, and is not used again.
         unsafe { (self.library.release_filter)(self.handle) }
     }
 }

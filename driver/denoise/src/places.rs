@@ -1,4 +1,4 @@
-//! Places where the library may be.
+//! Search for the file of Open Image Denoise.
 
 use std::env;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Environment variable that names the file of the library.
 pub const VARIABLE: &str = "PHOTONCARD_OIDN";
-/// File name of version 2.
+/// File name of version 2 of the library.
 pub(crate) const FILE: &str = if cfg!(windows) {
     "OpenImageDenoise.dll"
 } else if cfg!(target_os = "macos") {
@@ -15,17 +15,17 @@ pub(crate) const FILE: &str = if cfg!(windows) {
     "libOpenImageDenoise.so.2"
 };
 
-/// Folder of the library in a folder of Python's packages.
+/// Path from a folder of Python packages (`site-packages`) to the library's folder.
 const IN_PACKAGES: &str = "pyoidn/oidn/lib";
 
-/// File that the environment states.
+/// Returns the path in the environment variable `VARIABLE`; `None` if it is unset or empty.
 pub(crate) fn stated() -> Option<PathBuf> {
     let stated = env::var_os(VARIABLE).filter(|stated| !stated.is_empty()).map(PathBuf::from)?;
     // A loader searches its own folders for a bare name.
     Some(std::path::absolute(&stated).unwrap_or(stated))
 }
 
-/// Existing files, in order.
+/// Returns the existing library files beside the program and in Python packages, in the order of search.
 pub(crate) fn candidates() -> Vec<PathBuf> {
     let program = env::current_exe().ok();
     let beside = program.iter().filter_map(|program| program.parent()).flat_map(|folder| {
@@ -35,7 +35,7 @@ pub(crate) fn candidates() -> Vec<PathBuf> {
     beside.chain(in_packages).filter(|path| path.is_file()).collect()
 }
 
-/// Folders of Python's packages: of the active environment, the user and the system.
+/// Returns the folders of Python packages of the active environment, the user and the system.
 fn package_folders() -> Vec<PathBuf> {
     let variable = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let environments = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(variable);
@@ -46,7 +46,7 @@ fn package_folders() -> Vec<PathBuf> {
 }
 
 fn package_folders_in(root: &Path) -> Vec<PathBuf> {
-    // Python has one folder on Windows, elsewhere one a version.
+    // Python has one package folder on Windows, elsewhere one per version.
     let mut folders = vec![root.join("Lib/site-packages"), root.join("lib/python3/dist-packages")];
     let mut versions: Vec<PathBuf> = fs::read_dir(root.join("lib"))
         .into_iter()

@@ -1,36 +1,38 @@
-//! Scenes all of whose detail is in a small part of a plane ground, such as a product on a ground of many
-//! kilometres.
+//! Scenes with a large plane ground and detail only in a small part of it, such as a product on a ground of
+//! many kilometres.
 //!
-//! Photons are stored only in this part and its surroundings. Their coordinates have 20 bits, so that on a
-//! ground of 10 km they would be multiples of 1 cm, and few photons of the sky would reach a product of 10
-//! cm. Triangles that are larger than their distance from the middle of the part are split, because a
-//! computed point of a triangle is only as exact as the coordinates of the triangle's corners.
+//! Photons are stored only in this part and its surroundings. Their coordinates have 20 bits: on a ground of
+//! 10 km they would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. A
+//! computed point of a triangle is only as exact as the coordinates of the triangle's corners. Triangles that
+//! are larger than their distance from the middle of the part are therefore split.
 
 use glam::{Vec2, Vec3, Vec4};
 use photoncard_scene::{NO_ATTRIBUTES, NO_TANGENTS, Scene, SceneContents, Triangle, VertexAttributes};
 
 /// Maximum size of a triangle that counts as detail, relative to the scene's size.
 const SHARE_OF_DETAIL: f32 = 1.0 / 64.0;
-/// Distance up to which photons around the box of all detail are stored, relative to the box's size.
+/// Distance from the bounding box of all detail up to which photons are stored, relative to the size of this
+/// box.
 const SIZES_AROUND: f32 = 256.0;
-/// Maximum distance of the detail, and of corners of the ground, from the ground's plane, relative to the
-/// distance up to which photons are stored. Of the light that the ground reflects to the detail, at most
-/// 1 / 2^12 comes from farther away.
+/// Maximum distance of the detail and of the ground's corners from the ground's plane, relative to the
+/// distance around the detail up to which photons are stored. Of the light that the ground reflects to the
+/// detail, at most 1 / 2^12 comes from beyond that distance.
 const MAX_HEIGHT: f32 = 1.0 / 64.0;
-/// Maximum number of triangles of the ground, which are split.
+/// Maximum number of triangles of the ground, before they are split.
 const MAX_GROUND: usize = 1024;
-/// Minimum size of the part of a scene in which photons are stored, relative to the scene's size. Depths,
-/// whose unit is a cell of the photon grid, then fit 64 bits for cameras within the scene.
+/// Minimum distance from the bounding box of all detail up to which photons are stored, relative to the
+/// scene's size. Depths, in cells of the photon grid, then fit 64 bits for cameras within the scene.
 const MIN_SHARE: f32 = 1.0 / 8192.0;
-/// Margin for rounding around the part of a scene in which photons are stored, relative to the distance up to
-/// which photons around the detail are stored.
+/// Margin for rounding beyond the scene's bounds, relative to the distance from the detail up to which
+/// photons are stored.
 const MARGIN: f32 = 1e-3;
-/// Maximum size of a triangle near the centre of the part of a scene in which photons are stored, relative to
-/// the size of this part.
+/// Size up to which triangles are never split, relative to the size of the part of the scene in which photons
+/// are stored.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
 
-/// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
-/// it is much smaller than the scene's bounding box, and all larger triangles are of one plane ground.
+/// Returns the box in which photons are stored, around all detail of a scene and its surroundings: its lower
+/// and upper corner, metres. Returns `None` unless the box is less than half as large as the scene's bounding
+/// box and all larger triangles lie in one plane ground.
 pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
     let (lower, upper) = scene.bounds();
     let size = (upper - lower).max_element();
@@ -53,8 +55,8 @@ pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
     (is_smaller && is_plane(ground(), [low, high], MAX_HEIGHT * around)).then_some(part)
 }
 
-/// Returns whether there are 1 to [`MAX_GROUND`] triangles, which lie with `corners` within `distance` metres
-/// of one plane.
+/// Returns whether there are 1 to [`MAX_GROUND`] triangles, and they and `corners` lie within `distance`
+/// metres of one plane.
 fn is_plane<'s>(
     triangles: impl Iterator<Item = &'s Triangle> + Clone,
     corners: [Vec3; 2],
@@ -67,7 +69,8 @@ fn is_plane<'s>(
     normal != Vec3::ZERO && all.all(|place| normal.dot(place - origin).abs() <= distance)
 }
 
-/// Splits the triangles of a scene that are larger than their distance from the centre of a part.
+/// Splits triangles until each is at most as large as its distance from the centre of a box, or as
+/// `SHARE_OF_PART` of the box's size.
 pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
     let centre = lower.midpoint(upper);
     let least = SHARE_OF_PART * (upper - lower).max_element();
@@ -131,8 +134,8 @@ fn longest_edge(vertices: &[Vec3; 3]) -> usize {
     (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)
 }
 
-/// Splits values at a triangle's corners into those of its halves, which meet at the middle of edge `edge`.
-/// Corners keep their order.
+/// Splits the values at a triangle's corners into the values of its two halves. The triangle is split at the
+/// middle of edge `edge`. Corners keep their order.
 fn halves<T: Copy>(edge: usize, corners: [T; 3], middle: impl Fn(T, T) -> T) -> [[T; 3]; 2] {
     let end = (edge + 1) % 3;
     let middle = middle(corners[edge], corners[end]);

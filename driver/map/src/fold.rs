@@ -1,39 +1,40 @@
-//! Folding of binary trees into wide nodes with minimum expected cost, numbered as in a card image (Ylitie,
-//! Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section
-//! 3.1).
+//! Folds a binary tree into wide nodes with minimum expected traversal cost (Ylitie, Karras, Laine 2017,
+//! *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section 3.1). Nodes and leaves
+//! are numbered as in a card image.
 
 use std::collections::VecDeque;
 
 use photoncard_shared::layout::{Links, NODE_CHILDREN};
 
-/// A binary tree with the costs of its optimal folding.
+/// Binary tree, with the expected costs of its cheapest conversion to wide nodes.
 pub(crate) struct Tree<L, B> {
     part: Part<L, B>,
-    /// Expected costs of a traversal. `costs[i]` is the cost if the tree becomes at most `i + 1` children of
-    /// one node.
+    /// `costs[i]` is the expected traversal cost if the tree is represented by at most `i + 1` children of
+    /// one wide node.
     costs: [f32; NODE_CHILDREN],
 }
 
-/// A node of a binary tree: the leaf that it can become, and its two children, if any. Its costs are in
-/// [`Tree`], because only its parent needs them.
+/// Node of a binary tree, without its costs. They are in [`Tree`], because they are needed only until the
+/// parent node is built.
 struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    /// Distribution of children. If this subtree becomes at most `i + 1` children of a wide node, `first[i]`
-    /// of them come from the first of [`Self::parts`]; 0 if the whole subtree becomes one child.
+    /// `first[i]` is the number of children that come from the first of [`Self::parts`] if this subtree is
+    /// represented by at most `i + 1` children of a wide node. It is 0 if the whole subtree becomes one
+    /// child.
     first: [u8; NODE_CHILDREN],
 }
 
 impl<L, B: Copy> Tree<L, B> {
-    /// Creates a tree of one leaf, whose visit has the cost `cost`.
+    /// Creates a tree of one leaf. `cost` is the cost of a visit of the leaf.
     pub(crate) fn leaf(leaf: L, bounds: B, cost: f32) -> Self {
         let part = Part { bounds, leaf: Some(leaf), parts: None, first: [0; NODE_CHILDREN] };
         Self { part, costs: [cost; NODE_CHILDREN] }
     }
 
-    /// Creates a tree whose root has two children. `node` is the cost of a visit of the root as a wide node;
-    /// `leaf` is the leaf that the tree can become, with the cost of its visit.
+    /// Creates a tree whose root has two children. `node` is the cost to visit the root if it becomes a wide
+    /// node. `leaf` is the leaf that can replace the whole tree, with its cost.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
         let (mut costs, mut first) = cheapest_pairs(parts.each_ref().map(|tree| &tree.costs));
         // As a wide node of its own it may be split differently than among the children of its parent.
@@ -54,23 +55,21 @@ impl<L, B: Copy> Tree<L, B> {
         Self { part: Part { bounds, leaf, parts, first }, costs }
     }
 
-    /// Bounds of the root.
     pub(crate) fn bounds(&self) -> B {
         self.part.bounds
     }
 
-    /// Leaf that the tree can become, if any.
+    /// Leaf that can replace the whole tree, if any.
     pub(crate) fn as_leaf(&self) -> Option<&L> {
         self.part.leaf.as_ref()
     }
 }
 
-/// Returns the costs of two trees as at most 1 to [`NODE_CHILDREN`] children in all (infinite for one child),
-/// and for each of these maxima the number of children that come from the first tree: of equally cheap
-/// numbers the smallest.
+/// Returns two arrays. Entry `i` of the first is the least cost of two trees that are represented by at most
+/// `i + 1` children in all (infinite for `i = 0`). Entry `i` of the second is the number of these children
+/// that belong to the first tree. Of equally cheap numbers it is the smallest.
 fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHILDREN], [u8; NODE_CHILDREN]) {
-    // The arrays are longer than the result, so that each number of the first tree's children takes one pass
-    // over all lanes.
+    // The arrays are longer than the result, so that the inner loop always has [`NODE_CHILDREN`] iterations.
     let (mut costs, mut first) = ([f32::INFINITY; 2 * NODE_CHILDREN], [0_u32; 2 * NODE_CHILDREN]);
     for (children, below) in (1..NODE_CHILDREN).zip(below) {
         for (index, above) in (children..).zip(above) {
@@ -84,7 +83,7 @@ fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHI
 }
 
 impl<L, B: Copy> Part<L, B> {
-    /// Appends this subtree to the children of a wide node, as at most `most` children.
+    /// Appends at most `most` nodes, which together represent this subtree, to the children of a wide node.
     fn unfold(self, most: usize, children: &mut Vec<Self>) {
         let first = self.first[most - 1] as usize;
         match self.parts {
@@ -104,7 +103,7 @@ pub(crate) struct WideNode<B> {
     pub(crate) links: Links,
 }
 
-/// A folded tree, in the order of a card image.
+/// Tree of wide nodes and leaves, both in the order of a card image.
 pub(crate) struct Folded<L, B> {
     /// Nodes in breadth-first order, from the root.
     pub(crate) nodes: Vec<WideNode<B>>,
@@ -149,7 +148,7 @@ impl<L, B: Copy> Folded<L, B> {
 mod tests {
     use super::*;
 
-    /// Costs that fall with the number of children, as those of trees do; equal ones are frequent.
+    /// Pseudo-random costs that do not rise with the number of children. Equal costs are frequent.
     fn costs(seed: u32) -> [f32; NODE_CHILDREN] {
         let mut cost = 100.0;
         std::array::from_fn(|i| {

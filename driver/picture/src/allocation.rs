@@ -1,5 +1,5 @@
-//! Checks, before work of a known size, that its memory can be allocated. A refusal is then an error, whereas
-//! an allocation that fails during the work aborts the process.
+//! Checks that memory can be allocated, before work that needs a known amount of it. A refusal is then an
+//! error, whereas a failed allocation during the work aborts the process.
 
 use std::hint::black_box;
 

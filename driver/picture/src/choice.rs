@@ -8,7 +8,7 @@ pub trait Choice: Copy + Send + Sync + 'static {
     /// All values, in the order in which they are presented.
     const ALL: &'static [Self];
 
-    /// Name of the value, as in the argument of its option.
+    /// Name of the value, as it is given to a command-line option.
     fn name(self) -> &'static str;
 
     /// Explanation of the value in a line of help; empty if the name suffices.

@@ -25,7 +25,7 @@ pub struct Difference {
     pub pixel_count: usize,
     /// Errors over the channels of all pixels.
     pub pixels: Errors,
-    /// Errors over the mean of each channel in each block.
+    /// Errors of block means.
     pub blocks: BlockErrors,
     /// Mean of the reference over pixels and channels.
     pub mean_reference: f64,
@@ -58,11 +58,11 @@ pub struct BlockErrors {
     pub excluded: usize,
     /// Number of compared blocks whose reference is black. They have no relative errors.
     pub black: usize,
-    /// Errors over the mean of each channel in each block.
+    /// Errors of the means of each channel in each block.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Median over the blocks of `|a - b| / b`, where `a` and `b` are means over the pixels and channels of a
-    /// block; `None` (JSON `null`) if all blocks are black.
+    /// Median over the blocks of `|a - b| / b`; `None` (JSON `null`) if all blocks are black. Here `a` and
+    /// `b` are means over the pixels and channels of a block.
     pub relative_median: Option<f64>,
     /// 95th percentile of `|a - b| / b` over the blocks: the smallest error that 95 % of them do not exceed.
     pub relative_p95: Option<f64>,
@@ -117,7 +117,7 @@ pub enum DifferenceError {
 /// Compares `image` with `reference` in blocks of `block` x `block` pixels.
 ///
 /// With `exclude`, a block is excluded from all results if any channel of any of its reference pixels exceeds
-/// that radiance: such a block shows an emitter, whose radiance would outweigh everything else. Only the
+/// that radiance. Such a block shows an emitter, whose radiance would outweigh everything else. Only the
 /// sizes of the data windows matter, not their positions.
 ///
 /// # Errors

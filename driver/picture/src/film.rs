@@ -105,7 +105,8 @@ pub enum FilmError {
         "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
     )]
     Other,
-    /// The film of earlier samples lacks pixels, or has as many samples as the picture is to have, or more.
+    /// The film of earlier samples is incomplete, or it has at least as many samples as the picture is to
+    /// have.
     #[error("a complete film of {samples} samples a pixel is no part of a picture of {asked}")]
     NoMore {
         /// Number of samples of the film.
@@ -172,7 +173,7 @@ impl Film {
         &self.format
     }
 
-    /// Excludes the samples of `base` from an empty film, so that only the others are rendered.
+    /// Restricts an empty film to the samples that `base` lacks, so that only these are rendered.
     ///
     /// # Errors
     /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if no sample remains or
@@ -191,8 +192,8 @@ impl Film {
         Ok(())
     }
 
-    /// Creates an empty film with the same window, for `samples` of the picture's samples from number `first`
-    /// on.
+    /// Creates an empty film with the same window, for a part of the picture's samples: `samples` of them
+    /// from number `first` on.
     ///
     /// # Errors
     /// [`FilmError::Memory`].

@@ -1,8 +1,8 @@
 //! Checks that files of finished pictures are unchanged since they were written.
 //!
 //! An `OpenEXR` file has no checksum of its own. Files of this program contain a CRC-32C of the file in the
-//! standard attribute `comments`; its digits count as zeros in the sum. A PNG has a CRC-32 for each of its
-//! chunks.
+//! standard attribute `comments`. It is computed with zeros in place of its digits. A PNG has a CRC-32 for
+//! each of its chunks.
 
 use photoncard_shared::checksum::Checksum;
 

@@ -138,15 +138,15 @@ impl Layers {
         self.0.iter().copied()
     }
 
-    /// Returns whether frames must ask chips for layers
+    /// Returns whether any of the layers is one that chips send only on request
     /// ([`photoncard_shared::message::FrameParameters::layers`]): direct light, indirect light, caustics or
     /// final gathers.
     pub fn are_of_chip(&self) -> bool {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// Returns all four layers that chips send only on request if at least one of these layers is among them,
-    /// otherwise none.
+    /// Returns all four layers that chips send only on request if `self` contains any of them, otherwise
+    /// none.
     pub fn of_chip(&self) -> Self {
         let are_of_chip = self.are_of_chip();
         Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())

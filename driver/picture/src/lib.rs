@@ -4,14 +4,13 @@
 //! a [`Film`](film::Film), which [`exr`] and [`tone_mapping`] write to files, or a sink of another crate. A
 //! film does not depend on the order of its tiles, because sums are integers.
 //!
-//! - [`output`], [`heading`], [`intact`]: output files; their headings; checks that finished files are
-//!   intact.
-//! - [`printable`], [`choice`]: escaping of foreign text; names of enumerations.
-//! - [`allocation`], [`foreign`]: memory limits; decoders that panic.
-//! - [`sums`], [`sink`], [`viewer`]: format of pixels' sums, and their values; traits of destinations of
+//! - [`output`]: output files; [`heading`]: their headings; [`intact`]: checks that files are intact.
+//! - [`printable`]: escaping of foreign text; [`choice`]: names of enumeration values.
+//! - [`allocation`]: checks that memory can be allocated; [`foreign`]: isolation of decoders that may panic.
+//! - [`sums`]: format of pixels' sums, and their values; [`sink`] and [`viewer`]: traits of destinations of
 //!   tiles, and of viewers.
-//! - [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`]: pixels of a picture; its layers; files;
-//!   comparison.
+//! - [`film`]: pixels of a picture; [`layer`]: its layers; [`exr`] and [`tone_mapping`]: picture files;
+//!   [`difference`]: comparison of pictures.
 //!
 //! This is the lowest crate of the host. Scenes read environments through [`exr`], and all crates write files
 //! through [`output`].

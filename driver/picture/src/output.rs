@@ -111,9 +111,9 @@ impl Write for PendingFile {
     }
 }
 
-/// Returns whether two paths name one file, or would name one after it is written. For files that do not
-/// exist yet, names that the file system treats as equal, such as names that differ only in case, count as
-/// different.
+/// Returns whether two paths name one file, or would name one after it is written. Names of files that do not
+/// exist yet are compared exactly, even if the file system treats some of them as equal, such as names that
+/// differ only in case.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let absolute = |path: &Path| {
         let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));

@@ -5,8 +5,8 @@ use photoncard_shared::message::{
     FrameParameters, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
 };
 
-/// Binary logarithm of the light per sample, in units of 2^-40 radiance units, above which a pixel is
-/// dazzling.
+/// Binary logarithm of the mean light per sample above which a pixel is dazzling, in the unit of sums: 2^-40
+/// radiance units.
 const DAZZLING_SAMPLE: u32 = 40 + 16;
 /// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the greatest sum.
 const DAZZLING: i64 = 1 << 61;
@@ -18,8 +18,8 @@ pub struct SumFormat {
     pub layers: bool,
     /// Number of samples in each sum.
     pub samples: u32,
-    /// Number of probes among the samples; 0 without adaptive sampling. The light of probes has the weight
-    /// 1/2.
+    /// Number of probes among the samples: with adaptive sampling the first samples of a pixel, else 0. The
+    /// light of probes has the weight 1/2.
     pub probes: u32,
     /// Units of the sums.
     pub scale: SumScale,
@@ -51,8 +51,8 @@ impl SumFormat {
         Self { layers, samples, probes, scale }
     }
 
-    /// Format of `samples` of the picture's samples from number `first` on, derived from the format of all
-    /// samples.
+    /// Format of `samples` samples from number `first` on. `self` is the format of all samples of the
+    /// picture.
     pub(crate) fn of_part(&self, first: u32, samples: u32) -> Self {
         Self::of_range(self.layers, (first, samples), self.probes > 0, self.scale)
     }
@@ -75,9 +75,9 @@ impl SumFormat {
         }
     }
 
-    /// Returns whether the light of a pixel is far above that of its scene: its samples have more than 2^16
-    /// radiance units on average, whereas the brightest surface has at most 2^7. Such pixels are rare. They
-    /// occur where a lamp without an area touches a surface.
+    /// Returns whether the light of a pixel is far above that of its scene: more than 2^16 radiance units per
+    /// sample on average. The brightest surface has at most 2^7. Such pixels are rare. They occur where a
+    /// lamp without an area touches a surface.
     pub fn is_dazzling(&self, sums: &PixelSums) -> bool {
         let most = (i64::from(self.samples) << DAZZLING_SAMPLE).min(DAZZLING);
         sums.light.into_iter().any(|light| light > most)

@@ -1,5 +1,4 @@
-//! Viewers: sinks that show tiles as soon as they are finished. A render continues without a viewer that
-//! fails.
+//! Viewers: sinks that show tiles as soon as they are finished. A render continues if a viewer fails.
 
 use std::error::Error;
 
@@ -8,8 +7,8 @@ use crate::sink::TileSink;
 
 /// A sink that shows tiles as soon as they are finished. Neither its failure nor its delay affects a render.
 pub trait Viewer: TileSink {
-    /// Takes the error that ended the viewer: later calls return `None`. After an error nothing more is
-    /// shown.
+    /// Returns the error that ended the viewer, once: later calls return `None`. After an error nothing more
+    /// is shown.
     fn failure(&self) -> Option<Box<dyn Error>>;
 
     /// Shows the pixels of the complete film that the viewer has not shown yet, in bounded time.

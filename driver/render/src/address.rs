@@ -26,7 +26,7 @@ pub enum CardAddress {
     Remote(RemoteAddress),
 }
 
-/// Memory of a remote card that is assumed while a scene is loaded for it, bytes.
+/// Assumed memory of a remote card while a scene is loaded for it, bytes. The card states its memory later.
 const REMOTE_DRAM_BYTES: u64 = 4 << 30;
 /// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
@@ -72,7 +72,7 @@ impl CardAddress {
         Self::Remote(RemoteAddress::serial(path))
     }
 
-    /// Forms of an address, for a line of help.
+    /// Text that lists the valid forms of an address, for help and errors.
     pub fn forms() -> String {
         let emulated: String =
             EmulatedKind::ALL.iter().map(|kind| format!("{}[:CHIPS], ", kind.name())).collect();
@@ -87,8 +87,8 @@ impl CardAddress {
         }
     }
 
-    /// Name in errors of the card `index` of a render, which is at this address. The name of a remote card
-    /// includes the address.
+    /// Name that errors give to card number `index` of a render, which is at this address. The name of a
+    /// remote card includes the address.
     pub(super) fn name_of(&self, index: usize) -> String {
         match self {
             Self::Emulated { .. } => format!("card {index}"),
@@ -96,8 +96,8 @@ impl CardAddress {
         }
     }
 
-    /// Memory of a card at this address that is assumed while a scene is loaded for the card, bytes. A remote
-    /// card states its memory later; until then 4 GiB limit the memory that a scene file may take.
+    /// Memory of a card at this address, bytes. It limits the memory that a scene file may take. A remote
+    /// card states its memory only after the scene is loaded; 4 GiB are assumed for it.
     pub fn dram_bytes(&self) -> u64 {
         match *self {
             Self::Emulated { memory, .. } => memory,
@@ -122,7 +122,7 @@ pub(super) fn check_chips(chips: usize) -> Result<(), RenderError> {
     })
 }
 
-/// Returns whether the addresses name exactly one card, and it is emulated.
+/// Returns whether the addresses name exactly one card, which is emulated.
 pub(super) fn is_one_emulated_chip(addresses: &[CardAddress]) -> bool {
     matches!(addresses, [CardAddress::Emulated { chips: 1, .. }])
 }

@@ -1,4 +1,4 @@
-//! Thread of a card on the host. It moves bytes between the card's port and its session.
+//! Host thread of a card, which moves bytes between the card's port and its session.
 
 use std::time::Duration;
 
@@ -14,14 +14,14 @@ use super::{CardError, Phase, RenderError};
 struct CardAtWork<'a> {
     number: CardNumber,
     greeted: &'a mut GreetedCard,
-    /// True from the report of the card's loss until the card is loaded again.
+    /// True from the time when the loss of the card is reported until the card is loaded again.
     is_lost: bool,
     crew: &'a Crew<'a>,
 }
 
-/// Loads the card image into a card and renders tiles on the card until none is left. A lost card is greeted
-/// again while other cards render. A card that answers wrongly, or fails repeatedly, is given up. Returns the
-/// time from the crew's start until the card was loaded; zero if it was not loaded.
+/// Loads the card image into a card and renders tiles on the card until all are done. A lost card is greeted
+/// again while other cards render. A card that sends wrong data, or fails repeatedly, is given up. Returns
+/// the time from the start of the crew until the card was loaded; zero if it was not loaded.
 pub(super) fn render_on(
     number: CardNumber,
     greeted: &mut GreetedCard,
@@ -39,7 +39,7 @@ pub(super) fn render_on(
 }
 
 impl CardAtWork<'_> {
-    /// Moves bytes and tiles once. Returns false if the card failed and is not retried.
+    /// Exchanges bytes and tiles with the card once. Returns false if the card failed and is not retried.
     fn go_on(&mut self) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         let dispatcher = &crew.dispatcher;
@@ -63,7 +63,7 @@ impl CardAtWork<'_> {
         collected.map_err(|error| self.crew.end(error))
     }
 
-    /// Returns the card's tiles to the scheduler after an error. Returns whether the card is retried.
+    /// Gives the card's tiles back to the scheduler after an error. Returns whether the card is retried.
     fn recover(&mut self, error: SessionError) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         if error.is_wrong() {
@@ -84,8 +84,7 @@ impl CardAtWork<'_> {
         if is_closed { self.reopen() } else { Ok(true) }
     }
 
-    /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be
-    /// reached again.
+    /// Reconnects to a remote card whose link was closed. Returns false for an emulated card.
     fn reopen(&mut self) -> Result<bool, RenderError> {
         let Some(address) = self.greeted.card.close() else { return Ok(false) };
         if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {

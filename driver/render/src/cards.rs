@@ -1,5 +1,5 @@
-//! Renders tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay
-//! open for the next picture.
+//! Renders tiles on cards: connects to all cards, greets them, and renders on them in parallel. The
+//! connections stay open for the next picture.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
@@ -27,8 +27,8 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage, TileLines};
 
-/// Maximum pause between renders after which a remote card is used without a new greeting: the card may close
-/// a silent link.
+/// Maximum pause between renders. After a longer one, remote cards are greeted again, because a card may
+/// close a silent link.
 const MAX_REST: Duration = Duration::from_secs(5);
 
 /// Cards that answered the greeting.
@@ -38,7 +38,7 @@ pub(super) struct Cards {
     /// Emulated cards that were left out of the last picture because of their budget. They may fit the next
     /// picture.
     left_out: Vec<(String, GreetedCard)>,
-    /// Names of the cards that were reported to the observer as left out.
+    /// Names of the cards that the observer already knows to be left out.
     known: Vec<String>,
     start: Instant,
     shared: SharedImage,
@@ -47,7 +47,7 @@ pub(super) struct Cards {
     /// Number of cards that did not answer the greeting, were left out because of their budget, or were given
     /// up in an earlier render.
     lost: usize,
-    /// End of the last render; end of the greetings before the first.
+    /// Time at which the last render ended, or the greetings if there was no render.
     used: Instant,
 }
 
@@ -93,17 +93,17 @@ impl Cards {
         Ok(this)
     }
 
-    /// Returns whether these are the cards of the settings, as many as needed, and usable without a new
-    /// greeting.
+    /// Returns whether these are the cards of the settings, enough of them are left, and they can be used
+    /// without a new greeting.
     pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
         let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
         let is_fresh = !self.set.addresses.iter().any(is_remote) || self.used.elapsed() <= MAX_REST;
-        // The counts of a modelled memory are those of one render, so that its card serves no other.
+        // A modelled memory counts the traffic of one render, so that its card cannot be used for another.
         let is_modelled = settings.modelled_caches().is_some();
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
 
-    /// Takes back cards that were left out of the last picture, so that they are checked for the next.
+    /// Takes back the cards that were left out of the last picture, to check them for the next picture.
     pub(super) fn take_back(&mut self) {
         self.lost -= self.left_out.len();
         self.known = self.left_out.iter().map(|(name, _)| name.clone()).collect();
@@ -125,9 +125,9 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Gives the card image by reference to emulated cards into which nothing was loaded, instead of sending
-    /// it over their links. Unless `is_image_kept`, the first card is loaded over its link, so that
-    /// statistics count one loading. Cards on faulty links are always loaded.
+    /// Gives emulated cards into which nothing was loaded the card image by reference, instead of sending it
+    /// over their links. If the image is not kept from earlier, the first card is loaded over its link, so
+    /// that statistics count one loading. With injected faults, all cards are loaded over their links.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
         let is_faulty = self.set.faults.is_some();
         for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
@@ -159,7 +159,7 @@ impl Cards {
         cards.flat_map(|(number, (_, card))| card.tiles.iter().map(move |tile| (number, tile)))
     }
 
-    /// Renders a scheduler's tiles on all cards and stores them in sinks.
+    /// Renders the tiles of a scheduler on all cards and passes them to the sinks.
     fn render(
         &mut self,
         job: &Job,
@@ -242,8 +242,7 @@ impl Cards {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
 
-    /// Leaves out cards whose budgets fail the check, as long as `needed` others are left, and reports their
-    /// names to the observer.
+    /// Leaves out all cards whose budgets fail the check, and reports their names to the observer.
     ///
     /// # Errors
     /// The failure of a card, if fewer than `needed` cards are left.
@@ -270,18 +269,19 @@ impl Cards {
             // All cards fail alike: the setting is at fault.
             return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
         }
-        // If too few cards are left, the last misfit is the error of the picture, even if it was reported
-        // before.
+        // If too few cards are left, the error of the last card without enough capacity is the error of the
+        // picture, even if it was reported before.
         let has_enough = self.cards.len() >= needed;
         let misfits = misfits.into_iter().filter(|(name, _)| !has_enough || !self.known.contains(name));
         let misfits = misfits.map(|(name, error)| (name, CardError::of_budget(&error)));
         self.lose(misfits.collect(), needed, observer)
     }
 
-    /// Renders the tiles and stores them in the sinks.
+    /// Renders the tiles of the work and passes them to the sinks.
     ///
     /// # Errors
-    /// If the trace cannot be written. All other errors are in [`Outcome::failure`], with the outcome so far.
+    /// If the trace cannot be written. All other errors are in [`Outcome::failure`], with an outcome that
+    /// describes the work until then.
     pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared card image over their links store no copy of it.
@@ -318,8 +318,8 @@ fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) 
 /// Returns the latest of the times at which the cards were loaded.
 ///
 /// # Errors
-/// The first failure other than [`RenderError::Stopped`]; without such a failure [`RenderError::Stopped`],
-/// which the threads of all cards return when the render is stopped.
+/// The first failure other than [`RenderError::Stopped`]. If there is none, [`RenderError::Stopped`], which
+/// all threads return when the render is stopped.
 fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
     let mut latest = Duration::ZERO;
     let mut is_stopped = false;
@@ -334,11 +334,11 @@ fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, Rende
 }
 
 impl RenderSettings {
-    /// Checks that tiles can be verified, if requested.
+    /// Checks that tiles can be verified by a second card, if the settings ask for it.
     ///
     /// # Errors
-    /// If there are fewer than two cards, the share is not valid, or memory is modelled, which would count
-    /// the reads of both cards.
+    /// If there are fewer than two cards, the fraction of verified tiles is invalid, or memory is modelled.
+    /// The model would count the reads of both cards.
     pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
@@ -362,11 +362,11 @@ impl RenderSettings {
         if self.cards.verify.is_some() { 2 } else { 1 }
     }
 
-    /// Creates the scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice,
-    /// because all reads count.
+    /// Creates the scheduler of the tiles for `cards` cards. If memory is modelled, no tile is rendered
+    /// twice, because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
-        // The counts of modelled caches depend on the order of the tiles, so the tiles keep the picture's
-        // order.
+        // The counts of modelled caches depend on the order of the tiles, so the order of the picture is
+        // kept.
         if self.modelled_caches().is_some() {
             return Scheduler::new(tiles, cards);
         }

@@ -10,7 +10,6 @@ use super::open_card::WAIT;
 use super::outputs::Outputs;
 use super::{CardError, RenderError};
 
-/// State shared by the threads of all cards.
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
     pub(super) outputs: &'a Outputs<'a>,
@@ -20,8 +19,8 @@ pub(super) struct Crew<'a> {
     pub(super) failed: AtomicBool,
 }
 
-/// Guard that stops the threads of the other cards if its own thread panics. Without the guard they would
-/// wait forever for the tiles of that thread.
+/// Guard that stops the threads of the other cards if its own thread panics. Otherwise they would wait
+/// forever for the tiles of the panicked thread.
 pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
 
 impl Drop for EndOthersOnPanic<'_> {
@@ -37,7 +36,7 @@ impl Crew<'_> {
     /// Returns whether all tiles are done.
     ///
     /// # Errors
-    /// If the observer or the failure of a card stopped the render.
+    /// If the observer stopped the render, a card failed, or a finished tile could not be stored.
     pub(super) fn is_complete(&self) -> Result<bool, RenderError> {
         if self.failed.load(Ordering::Relaxed) || self.outputs.observer.is_stopped() {
             return Err(RenderError::Stopped);
@@ -70,11 +69,11 @@ impl Crew<'_> {
         error
     }
 
-    /// Handles a card that is lost or given up; other cards render its tiles. `was_lost` is true if the loss
-    /// was already reported.
+    /// Marks a card as lost or given up (`standing`), and reports it to the observer. Other cards render its
+    /// tiles. `was_lost` is true if an earlier loss was already reported.
     ///
     /// # Errors
-    /// If no card is left that renders, unless this one was lost before and may return.
+    /// If no other card is left, unless this card was lost before and may return.
     pub(super) fn lose(
         &self,
         card: CardNumber,
@@ -99,7 +98,7 @@ impl Crew<'_> {
         }))
     }
 
-    /// Tells the threads of all cards to stop because of an error of the scheduler. Returns the error of the
+    /// Tells the threads of all cards to stop because of the scheduler's error. Returns it as an error of the
     /// render.
     pub(super) fn end(&self, error: SchedulerError) -> RenderError {
         let name = |source: &Source| match *source {

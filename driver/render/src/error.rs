@@ -34,7 +34,7 @@ pub enum CardError {
     #[error("{reason}")]
     #[diagnostic(help("{remedy}; or leave the card out"))]
     Budget {
-        /// Description of the part that does not fit.
+        /// Description of what does not fit.
         reason: String,
         /// Suggestion how to make the picture fit the card.
         remedy: String,
@@ -50,7 +50,7 @@ pub enum CardError {
 }
 
 impl CardError {
-    /// Error of a card whose budget failed a check with `error`.
+    /// Error of a card whose budget failed the check of the settings with `error`.
     pub(super) fn of_budget(error: &RenderError) -> Self {
         let remedy = error.help().map_or("choose other settings".to_owned(), |help| help.to_string());
         Self::Budget { reason: error.to_string(), remedy }
@@ -65,7 +65,7 @@ pub enum RenderError {
     #[diagnostic(help("{remedy}"))]
     Setting {
         /// Path of the setting's field in [`RenderSettings`](crate::RenderSettings), such as
-        /// `integrator.samples`. Texts of errors have such paths between backticks.
+        /// `integrator.samples`. Error messages enclose such paths in backticks.
         field: &'static str,
         /// Value of the field.
         value: String,
@@ -74,7 +74,7 @@ pub enum RenderError {
         /// Suggestion how to correct the setting.
         remedy: String,
     },
-    /// The scene has no such camera.
+    /// The scene lacks the camera of the settings, or the camera is orthographic.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
@@ -104,7 +104,7 @@ pub enum RenderError {
         #[diagnostic_source]
         source: CardError,
     },
-    /// Two cards render a tile differently, and no other card is left to decide.
+    /// Two cards rendered a tile differently, and no other card is left to decide which is right.
     #[error("{cards} render the tile {tile} differently: at least one of them lies")]
     #[diagnostic(help(
         "render with a third card, which decides; or with one that you trust. Tiles that only one of these cards has rendered are not kept"
@@ -115,7 +115,7 @@ pub enum RenderError {
         /// Names of the cards.
         cards: String,
     },
-    /// A tile in the partial file differs from the one that two cards render.
+    /// A tile in the partial file differs from the same tile as rendered by two cards.
     #[error(
         "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
@@ -131,7 +131,7 @@ pub enum RenderError {
         /// Rectangle of the tile, `X0,X1,Y0,Y1`.
         tile: String,
     },
-    /// Cards crash at some tiles. All other tiles are done.
+    /// Cards repeatedly crashed at some tiles. All other tiles are done.
     #[error("cards were lost again and again at work on the tiles {tiles}; all others are done")]
     #[diagnostic(help(
         "each is X0,X1,Y0,Y1 as `picture.crop` takes it: watch the card's own messages while it renders one of them alone, or \
@@ -178,7 +178,7 @@ impl From<PhotonError> for RenderError {
 }
 
 impl RenderError {
-    /// Returns whether the settings, the scene or the caller's files cause the error.
+    /// Returns whether the cause of the error is in the settings, the scene or the files of the caller.
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,

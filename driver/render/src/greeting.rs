@@ -1,4 +1,4 @@
-//! Greeting of a card: the first message, and its reply.
+//! Greeting of a card: the first message of a session, and the reply of the card.
 
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
@@ -17,9 +17,9 @@ pub(super) struct GreetedCard {
     pub(super) card: OpenCard,
     pub(super) session: Session,
     pub(super) budget: Budget,
-    /// Bytes of the link that statistics of earlier renders include.
+    /// Bytes of the link that the statistics of earlier renders have already counted.
     pub(super) counted: LinkBytes,
-    /// Tiles of the last picture that this card alone rendered.
+    /// Tiles of the last picture that this card, and no other, rendered.
     pub(super) tiles: Vec<Tile>,
 }
 
@@ -41,7 +41,7 @@ pub(super) enum GreetingError {
 }
 
 impl GreetingError {
-    /// Converts to the error of a render, in which the card has the name `card`.
+    /// Converts to an error of a render, which names the card `card`.
     pub(super) fn of_card(self, card: String) -> RenderError {
         match self {
             Self::Card(source) => RenderError::Card { card, source },
@@ -91,7 +91,7 @@ pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, R
     Ok(answers)
 }
 
-/// Starts, or connects to, the first card at an address.
+/// Starts the first emulated card at an address, or connects to the remote card there.
 pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
     let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
     card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
@@ -132,8 +132,8 @@ pub(super) fn greet_port(
     }
 }
 
-/// Random number of a session. It distinguishes the session from earlier ones whose frames may still arrive;
-/// two numbers are equal with probability 2^-32.
+/// Random number that identifies a session. It distinguishes the session from earlier ones whose frames may
+/// still arrive. Two numbers are equal with probability 2^-32.
 fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32

@@ -1,7 +1,8 @@
 //! A render, from a loaded scene to a complete film.
 //!
-//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, cards, statistics. The
-//! cards at the ends of their links fill the film. [`render`] is a renderer's first picture.
+//! A [`Renderer`] determines settings, film, outputs, card image and frame parameters in this order. Cards at
+//! the other ends of links then render the tiles of the film. [`render`] uses a new renderer for a single
+//! picture.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -57,8 +58,8 @@ use photoncard_scene::Scene;
 
 /// Renders a scene. A [`Renderer`] renders further pictures on the same cards.
 ///
-/// A serial port may stay open for about a second after the end, because an attempt to reopen it runs on a
-/// detached thread.
+/// A serial port may stay open for about a second after the function returns, because a detached thread may
+/// still try to reopen the port.
 ///
 /// # Errors
 /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
@@ -70,8 +71,8 @@ pub fn render(
     Renderer::default().render(scene, settings, observer)
 }
 
-/// Renders a scene with photons and an integrator that `choose` returns for the packed scene, after the cards
-/// have answered. `settings` determine everything else.
+/// Renders a scene as [`render`] does, but with photons and integrator chosen by `choose` for the packed
+/// scene. `choose` is called after the cards have answered. `settings` determine everything else.
 ///
 /// # Errors
 /// As [`render`], and the errors of `choose`.

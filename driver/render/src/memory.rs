@@ -1,4 +1,4 @@
-//! Statistics of reads from card memory, part of the statistics of a render.
+//! Statistics of reads from card memory, which are a part of the statistics of a render.
 
 use photoncard_firmware::memory::Stage;
 use photoncard_shared::address::Structure;
@@ -15,9 +15,9 @@ pub struct MemoryStatistics {
     pub photon_map: ReadStatistics,
     /// Reads of the scene.
     pub scene: ReadStatistics,
-    /// Reads by structure.
+    /// Reads by kind of data structure in card memory.
     pub structures: StructureReads,
-    /// Reads by stage.
+    /// Reads by stage of the chip's work.
     pub stages: StageReads,
     /// Bytes written into card memory: card images and kept irradiance records.
     pub written_bytes: u64,
@@ -26,9 +26,9 @@ pub struct MemoryStatistics {
 /// Reads of a part of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ReadStatistics {
-    /// Number of reads by chips, each within one line of card memory.
+    /// Number of reads requested by chips, each within one line of card memory.
     pub requests: u64,
-    /// Number of bytes requested.
+    /// Number of bytes that chips requested.
     pub raw_bytes: u64,
     /// Number of requests that hit a cache.
     pub line_hits: u64,
@@ -38,7 +38,7 @@ pub struct ReadStatistics {
     pub dram_bytes: u64,
 }
 
-/// Reads by structure.
+/// Reads by kind of data structure in card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StructureReads {
     /// Reads of the bounding volume hierarchy.
@@ -53,7 +53,7 @@ pub struct StructureReads {
     pub photon_nodes: ReadStatistics,
     /// Reads of photons.
     pub photons: ReadStatistics,
-    /// Reads of inner nodes above irradiance points.
+    /// Reads of inner nodes of the hierarchy over irradiance points.
     pub irradiance_nodes: ReadStatistics,
     /// Reads of irradiance points.
     pub irradiance_points: ReadStatistics,
@@ -124,7 +124,7 @@ impl MemoryStatistics {
     }
 }
 
-/// Sum of the reads for tiles whose stage and structure are chosen.
+/// Sum of the reads for tiles whose stage and structure `chosen` selects.
 fn reads(traffic: &MemoryTraffic, chosen: impl Fn(Stage, Structure) -> bool) -> ReadStatistics {
     let of_tiles = |stage: Stage, structure: Structure| stage != Stage::Begin && chosen(stage, structure);
     let requested = traffic.requested.sum(of_tiles);

@@ -1,18 +1,18 @@
 //! Estimates the noise of a picture from the differences of its passes.
 //!
-//! Let `A` and `B` be the means of the pixels over the first `n` and the next `n` samples, `M` their mean,
-//! `e_n` and `e_2n` the root mean square errors of `A` and `M`, and `D_n = E[(A - B)^2]`. `B` has the same
-//! error as `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. If `e_2n^2 = r e_n^2`, then
+//! Let `A` and `B` be the means of a pixel over the first `n` and the next `n` samples, and `M` their mean.
+//! Let `e_n` and `e_2n` be the root mean square errors of `A` and `M`, and `D_n = E[(A - B)^2]`. `B` has the
+//! same error as `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. If `e_2n^2 = r e_n^2`, then
 //! `e_2n^2 = D_n / 4 * r / (1 - r)`.
 //!
-//! Independent samples have `r = 1/2`. A stratified sequence does better, down to `1/4` for edges and smooth
-//! light (Owen 1997), more so with few samples than with many, and unevenly: the ratios of successive `D_n`
-//! are 0.24 to 0.69, and some numbers of samples happen to be better than others. One ratio for all pictures
-//! is closer to the truth than ratios measured in each.
+//! Independent samples have `r = 1/2`. A stratified sequence has a lower `r`, down to `1/4` for edges and
+//! smooth light (Owen 1997), and lower with few samples than with many. The decrease is uneven: the ratios of
+//! successive `D_n` are 0.24 to 0.69, and some numbers of samples happen to be better than others. One ratio
+//! for all pictures is closer to the truth than ratios measured in each.
 
 use photoncard_picture::film::Film;
 
-/// Factor of the squared noise when the number of samples doubles.
+/// Factor `r` by which the squared noise is multiplied when the number of samples doubles.
 const RATIO: f64 = 0.45;
 
 /// Estimate of the noise of a picture from the differences of passes that double the samples.
@@ -30,8 +30,8 @@ pub(super) struct NoiseEstimate {
 }
 
 impl NoiseEstimate {
-    /// Adds the pictures before and after a pass. A pass that does not double the samples does not contribute
-    /// to the estimate.
+    /// Adds the difference between the pictures before and after a pass to the estimate. A pass that does not
+    /// double the number of samples only updates that number.
     pub(super) fn add(&mut self, before: &Film, after: &Film) {
         let [few, all] = [before, after].map(|film| f64::from(film.format().samples));
         self.all = all;
@@ -50,8 +50,8 @@ impl NoiseEstimate {
         if self.is_of_black {
             return;
         }
-        // `A - M` is the share of the pass in `M` times `A - B`: half of it, or more with probes in `A`,
-        // which count by half.
+        // `A - M` is `A - B` times the weight of the pass in `M`. The weight is 1/2, or more if `A` contains
+        // probes, which count by half.
         let [few, all] = [before, after].map(|film| film.format().count().weight_of_light());
         let halves = 0.5 * all / (all - few);
         let quarter = squares / count / (sum / count).powi(2) * halves * halves;
@@ -72,8 +72,8 @@ impl NoiseEstimate {
         Some((self.squared? * (1.0 - doubled * (1.0 - RATIO))).sqrt())
     }
 
-    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate,
-    /// and if twice the samples of the last doubling do not suffice.
+    /// Number of samples to add so that the noise is at most `aim`. `None` before there is an estimate, or if
+    /// even twice the samples of the last doubling do not suffice.
     pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
         if self.noise()? <= aim {
             return Some(0);
@@ -108,7 +108,7 @@ mod tests {
         film
     }
 
-    /// Checks that the ratio of the estimate to the true error, for pixels with mean 1/2, is in `range`.
+    /// Checks that the estimated noise divided by the true error is in `range`, for pixels with mean 1/2.
     fn check(value: impl Fn(u32, u32) -> f64, range: RangeInclusive<f64>) {
         let mut estimate = NoiseEstimate::default();
         let mut before = film(1, &value);

@@ -21,7 +21,7 @@ pub enum Phase {
     Load,
     /// Rendering. Progress counts tiles.
     Tiles,
-    /// Test of a card's memory, which is not a phase of a render. Progress counts bytes written or read.
+    /// Test of the memory of a card, in a self-test. Progress counts bytes written or read.
     SelfTest,
 }
 
@@ -37,14 +37,14 @@ pub trait Observer: Sync {
     /// Reports that `done` of `total` tiles were taken over from an earlier render.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Reports that finished tiles are in the partial file, so that a render that ended early can be resumed.
+    /// Reports that finished tiles are in the partial file. If the render ends early, it can be resumed.
     fn kept(&self) {}
 
     /// Reports that a card was lost or given up. The other cards render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Reports that a card rendered a tile, before the sinks get it. `_dram_lines` is the number of lines
-    /// read from DRAM, if the memory is [modelled](super::RenderSettings::modelled_caches).
+    /// Reports that a card rendered a tile, before sinks receive the tile. `_dram_lines` is the number of
+    /// lines read from DRAM, if the memory is [modelled](super::RenderSettings::modelled_caches).
     fn rendered(&self, _card: &str, _tile: &Tile, _dram_lines: Option<u64>) {}
 
     /// Returns a sink of the observer for finished tiles, if it has one.
@@ -52,11 +52,11 @@ pub trait Observer: Sync {
         None
     }
 
-    /// Reports [statistics](super::Statistics) as JSON when a render ends with an error after its cards
-    /// began. They describe the work until then.
+    /// Reports [statistics](super::Statistics) of the work so far, as JSON. It is called when a render ends
+    /// with an error after its cards have begun.
     fn failed(&self, _statistics: Value) {}
 
-    /// Reports that a viewer does not, or no longer, show the picture. The render continues.
+    /// Reports that a viewer cannot show the picture, or can no longer. The render continues.
     fn not_shown(&self, _error: &dyn Error) {}
 }
 

@@ -1,4 +1,4 @@
-//! Open connections to cards: transfer of bytes between a session and its port, and reconnection.
+//! Connections to cards: opening, transfer of bytes between a session and its port, and reconnection.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -13,10 +13,10 @@ use super::address::CardAddress;
 use super::{CardError, RenderError};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 
-/// Host's end of a link.
+/// Port at the host's end of the link to a remote card.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
 
-/// Card with an open connection, and faults injected into its line, if any.
+/// Connection to a card, with the injector of faults into its line if the settings ask for faults.
 pub(super) struct OpenCard {
     connection: Connection,
     injector: Option<FaultInjector>,
@@ -24,8 +24,8 @@ pub(super) struct OpenCard {
 
 enum Connection {
     Emulated(EmulatedCard),
-    /// Port of a remote card. It is closed before it is reopened, because a device may allow only one user at
-    /// a time.
+    /// Port of a remote card; `None` while the link is closed. The port is closed before it is reopened,
+    /// because a device may allow only one user at a time.
     Remote {
         address: RemoteAddress,
         port: Option<BoxedPort>,
@@ -33,8 +33,9 @@ enum Connection {
 }
 
 impl OpenCard {
-    /// Starts, or connects to, the first card at an address. An emulated card can have a model of its memory,
-    /// and shares the host's card image. Injected faults depend on the card's number `index`.
+    /// Starts one emulated card, or connects to the remote card, at `address`. `index` is the number of the
+    /// card, on which injected faults depend. An emulated card gets the memory model `model`, if any, and
+    /// reads the card image in `shared` without a copy.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -54,13 +55,13 @@ impl OpenCard {
         Ok(Self { connection, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
     }
 
-    /// Returns whether the card is part of this process.
+    /// Returns whether the card is emulated in this process.
     pub(super) fn is_emulated(&self) -> bool {
         matches!(self.connection, Connection::Emulated(_))
     }
 
-    /// Closes the link to a remote card and returns its address, for reconnecting; `None` for an emulated
-    /// card.
+    /// Closes the link to a remote card, and returns the address at which it can be reopened. Returns `None`
+    /// for an emulated card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {
             Connection::Emulated(_) => None,
@@ -71,14 +72,14 @@ impl OpenCard {
         }
     }
 
-    /// Replaces the closed link by a reopened one.
+    /// Sets the reopened port of a remote card after `Self::close`.
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
         if let Connection::Remote { port, .. } = &mut self.connection {
             *port = Some(opened);
         }
     }
 
-    /// Takes the handle of an emulated card's empty memory ([`EmulatedCard::take_empty_memory`]).
+    /// Takes the handle by which an empty emulated card can get a card image by reference.
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
             Connection::Emulated(card) => card.take_empty_memory(),
@@ -86,12 +87,12 @@ impl OpenCard {
         }
     }
 
-    /// Returns whether writing the trace failed.
+    /// Returns whether writing the memory trace of the card failed.
     pub(super) fn trace_has_failed(&self) -> bool {
         matches!(&self.connection, Connection::Emulated(card) if card.trace_has_failed())
     }
 
-    /// Number of DRAM lines read for each of the card's tiles, if its memory is modelled.
+    /// Number of DRAM lines read for each finished tile; empty if the memory is not modelled.
     pub(super) fn tile_lines(&self) -> TileLines {
         match &self.connection {
             Connection::Emulated(card) => card.tile_lines().clone(),
@@ -99,7 +100,8 @@ impl OpenCard {
         }
     }
 
-    /// Ends an emulated card, or closes the link to a remote one. Returns the record of a modelled memory.
+    /// Ends an emulated card, or closes the link to a remote one. Returns traffic and trace of a modelled
+    /// memory.
     pub(super) fn finish(self) -> Option<MemoryRecord> {
         match self.connection {
             Connection::Emulated(card) => card.finish(),
@@ -120,7 +122,7 @@ impl Connection {
     }
 }
 
-/// Host's end of the link, with injected faults.
+/// Reads and writes at the host's end of the link, with injected faults.
 impl Port for OpenCard {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
         let port = self.connection.port()?;
@@ -151,12 +153,12 @@ fn boxed(port: impl Port + Send + 'static) -> BoxedPort {
     Box::new(port)
 }
 
-/// Maximum time that a port waits for a byte, and thus until a card's thread notices that the render was
-/// stopped.
+/// Maximum time that a port waits for a byte. After a render is stopped, the thread of a card notices it
+/// within this time.
 pub(super) const WAIT: Duration = Duration::from_millis(4);
 
-/// Moves the available bytes once in each direction. Waits at most [`WAIT`] if there are none. `slowest` is
-/// the argument of [`Session::tick`].
+/// Sends the outgoing bytes of a session to a port, then passes received bytes to the session. Waits for
+/// bytes for at most [`WAIT`]. `slowest` is the argument of [`Session::tick`].
 pub(super) fn exchange(
     session: &mut Session,
     port: &mut impl Port,
@@ -181,14 +183,14 @@ pub(super) fn exchange(
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Tries to reconnect to a card until it succeeds and returns the port, or until all tiles are done and
-/// returns `None`. `wait_for_end` waits for at most the given time and returns whether all tiles are done.
+/// Tries repeatedly to reconnect to a card. Returns the port, or `None` as soon as all tiles are done.
+/// `wait_for_end` waits until all tiles are done, for at most the given time, and returns whether they are.
 pub(super) fn reopen(
     address: &RemoteAddress,
     wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
 ) -> Result<Option<BoxedPort>, RenderError> {
-    // The first attempt waits as well: a peer that closes every link at once must not be contacted in a tight
-    // loop.
+    // The first attempt also follows a pause: a peer that closes every new link must not be contacted in a
+    // tight loop.
     while !wait_for_end(RETRY)? {
         let attempt = try_to_reach(address.clone());
         loop {
@@ -203,8 +205,9 @@ pub(super) fn reopen(
     Ok(None)
 }
 
-/// Tries to connect once, on a separate thread: resolving or connecting to an address can take seconds, and a
-/// render that ends does not wait for it. A port that nobody receives is closed.
+/// Tries to connect once, on a separate thread, and sends the port, or `None` on failure, to the returned
+/// receiver. Resolving or connecting can take seconds, for which an ending render does not wait. The port is
+/// closed if the receiver is gone.
 fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {

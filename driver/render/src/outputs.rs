@@ -12,20 +12,21 @@ use super::{Observer, RenderSettings};
 use crate::display::Display;
 use crate::partial::{PartialError, PartialRender};
 
-/// Outputs that the settings ask for, and that are written while a render runs.
+/// Outputs that are requested by the settings and written while a render runs.
 pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
-    /// Earlier samples that the render adds to. All tiles that are shown include them.
+    /// Film of earlier samples to which the render adds. Tiles are shown with these samples added.
     pub(super) base: Option<Arc<Film>>,
-    /// Number of dazzling tiles in the complete samples that are taken over from the file of finished tiles.
+    /// Number of dazzling tiles (light far above the scene's) among the complete samples taken over from the
+    /// file.
     pub(super) kept_dazzling: usize,
     viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
 }
 
 impl<'a> Outputs<'a> {
-    /// Opens the outputs. Tiles of a resumed render are written into the film and shown. If the resumed
-    /// render has complete samples, they replace `base`, and the film has the remaining samples.
+    /// Opens the outputs. Tiles of a resumed render are written into the film and shown. If the file has
+    /// samples with all their tiles, their film replaces `base`, and `film` has the remaining samples.
     ///
     /// # Errors
     /// If the file of finished tiles cannot be read, or is not the file of this picture.
@@ -38,7 +39,7 @@ impl<'a> Outputs<'a> {
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
             let mut identity = settings.identity(scene);
-            // The file may have any number of samples. With irradiance records, pixels depend on the planned
+            // The file may have any number of samples. With an irradiance cache, pixels depend on the planned
             // number.
             identity.remove("spp");
             if settings.integrator.irradiance_error.is_some() {
@@ -71,7 +72,7 @@ impl<'a> Outputs<'a> {
         sinks
     }
 
-    /// Checks that all finished tiles were written into their file.
+    /// Checks that writing finished tiles into their file has not failed.
     ///
     /// # Errors
     /// If writing a tile failed.
@@ -93,7 +94,7 @@ impl<'a> Outputs<'a> {
         }
     }
 
-    /// Shows the remaining pixels. Returns the file of finished tiles.
+    /// Sends the remaining pixels to the viewers. Returns the file of finished tiles.
     pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
         self.viewers.iter().for_each(|viewer| viewer.finish(film));
         self.report_failed_viewers();
@@ -101,7 +102,7 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// Shows tiles by the viewers and the observer, with the samples of the base added.
+/// Passes tiles to the viewers and the observer, with the samples of the base added.
 impl TileSink for Outputs<'_> {
     fn put(&self, tile: &FinishedTile) {
         let added = self.base.as_ref().and_then(|base| base.added_to(tile));
@@ -116,7 +117,6 @@ impl TileSink for Outputs<'_> {
     }
 }
 
-/// Creates the viewers that the settings ask for.
 fn viewers(settings: &RenderSettings, film: &Film) -> Vec<Box<dyn Viewer>> {
     let channels = settings.picture.layers.channels();
     let mut viewers: Vec<Box<dyn Viewer>> = Vec::new();

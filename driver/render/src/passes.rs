@@ -1,7 +1,8 @@
-//! Renders pictures by passes: samples are added until the time is over or the noise is low enough.
+//! Renders pictures by passes: adds samples until the time is over or the noise is low enough.
 //!
-//! The number of samples doubles from pass to pass. A pass and the picture before it are therefore estimates
-//! with equally many samples, and their difference shows the noise of their mean ([`NoiseEstimate`]).
+//! The number of samples doubles from pass to pass. The picture before a pass and the samples of the pass are
+//! therefore two estimates with equally many samples. Their difference shows the noise of their mean
+//! ([`NoiseEstimate`]).
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -16,26 +17,26 @@ use super::{Integrator, Observer, RenderError, RenderSettings};
 
 /// Maximum number of samples per pixel, which all kinds of chips support.
 const MAX_SAMPLES: u32 = 4096;
-/// Minimum number of samples at which an estimated noise is trusted to be below a limit.
+/// Minimum number of samples per pixel at which the noise estimate can end the passes.
 const MIN_SAMPLES: u32 = 16;
 const FIRST_SAMPLES: u32 = 1;
 /// Fraction of the remaining time that a pass is planned to take.
 const PLANNED_SHARE: f64 = 0.95;
 
-/// Condition that ends the passes of a picture: time or noise, whichever is reached first, and in any case
-/// 4096 samples per pixel.
+/// Condition that ends the passes of a picture: a time or a noise, whichever is reached first. 4096 samples
+/// per pixel end them in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time limit of the render. The first pass may exceed it, and so may the second if a card has no room
-    /// for irradiance records.
+    /// Time limit of the render. The first pass may exceed it. The second may, too, if a card has no room for
+    /// irradiance records.
     pub time: Option<Duration>,
-    /// Noise: estimated root mean square standard error of the pixels, relative to the mean of the picture.
+    /// Noise limit: estimated root mean square standard error of pixels, relative to the mean of the picture.
     pub noise: Option<f64>,
 }
 
-/// A picture rendered by passes, with its end.
+/// A picture rendered by passes, and the reason why they ended.
 pub struct Passes {
-    /// Picture of all complete passes. Its statistics of work are those of the last pass.
+    /// Picture of all complete passes. Its statistics describe the work of the last pass.
     pub rendering: Rendering,
     /// Estimated noise, as in [`Aim::noise`]; `None` after a single pass.
     pub noise: Option<f64>,
@@ -60,8 +61,8 @@ pub enum Ending {
 
 impl Renderer {
     /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as in
-    /// [`Self::render_chosen`]; the chosen number of samples becomes the planned number. The picture equals,
-    /// bit for bit, that of a single render with the same numbers of samples and planned samples.
+    /// [`Self::render_chosen`]. Their number of samples becomes the planned number. The picture equals, bit
+    /// for bit, that of a single render with the same number of samples and the same planned number.
     ///
     /// # Errors
     /// As [`Self::render_chosen`], if the first pass fails.
@@ -155,8 +156,8 @@ fn next_pass(
 /// Model of the time of passes: a constant, plus a time in proportion to the samples.
 #[derive(Default)]
 struct Pace {
-    /// Samples and seconds of the last pass but one, and of the last. A first pass that gathers irradiance
-    /// records for all passes is left out.
+    /// Number of samples and seconds of the last two passes, the last one second. A first pass that gathers
+    /// irradiance records for all passes is left out.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -165,13 +166,13 @@ impl Pace {
         self.last = [self.last[1], Some((f64::from(samples), seconds))];
     }
 
-    /// Number of samples that a pass of `seconds` seconds can have.
+    /// Number of samples that can be rendered in a pass of `seconds` seconds.
     fn samples_in(&self, seconds: f64) -> u32 {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
-        // The time per sample is at most the time of the whole pass divided by its samples, and at least a
-        // fourth of that.
+        // Bounds of the time per sample: the time of the last pass divided by its samples, and a fourth of
+        // that.
         let most = time / samples;
         let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
         let fixed = time - each * samples;

@@ -1,4 +1,4 @@
-//! Provenance of a render: everything that its picture and statistics depend on, by option names.
+//! Provenance of a render: everything that picture and statistics depend on, as values by option names.
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,8 @@ use crate::emulator::EmulatedKind;
 /// Provenance of a render. The caller adds the names of its inputs, which the library does not know.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
-    /// Everything that pixels depend on. Pictures store this provenance; it is equal for all orders, caches
-    /// and cards.
+    /// Everything that pixels depend on. It is stored in picture files, and does not depend on the order of
+    /// the work, caches or cards.
     pub pixels: NamedSettings,
     /// Everything else that the work depends on: order, photon map layout, cards, caches.
     pub work: NamedSettings,
@@ -32,7 +32,7 @@ impl Provenance {
         budgets: &[Budget],
     ) -> Self {
         let mut pixels = settings.identity(scene);
-        // All layers of the picture. The identity has only those that chips send on request.
+        // All layers of the picture. The identity has only the layers that chips send on request.
         pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
         // The distance in use, which is derived from the photons if none is stated.
         pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
@@ -53,7 +53,7 @@ fn view(camera: &Camera) -> Value {
     json!({"camera": name, "at": origin, "forward": forward, "up": up, "fov": vertical_fov.to_degrees()})
 }
 
-/// Numbers of chips by kind.
+/// Number of chips of each kind.
 fn chips(budgets: &[Budget]) -> BTreeMap<&'static str, usize> {
     let mut chips = BTreeMap::new();
     for budget in budgets {

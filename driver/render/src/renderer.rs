@@ -21,25 +21,26 @@ pub struct Rendering {
     pub film: Film,
     /// Statistics of the work.
     pub statistics: Statistics,
-    /// File of finished tiles. It should be removed after the picture is written.
+    /// File of finished tiles. The caller should remove it after writing the picture.
     pub partial: Option<PartialRender>,
 }
 
-/// Photons and integrator chosen for a packed scene.
+/// Settings of photons and integrator chosen for a packed scene.
 pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
 
-/// Function that chooses photons and integrator for a packed scene.
+/// Function that chooses the settings of photons and integrator for a packed scene.
 type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
 
 /// Renders pictures one after another on the same cards, which stay open between pictures.
 ///
-/// If only the camera changes, the host traces no photons and sends no card image; it sends only tiles. If
-/// the scene or its photons change, the host makes a new image, and a card receives only the changed lines.
-/// The card checks the checksum of the whole image, and receives the whole image if the checksum differs or
+/// If only the camera changes, the host traces no photons and sends no card image, only tile commands. If the
+/// scene or its photons change, the host makes a new image, and a card receives only the changed lines. The
+/// card checks the checksum of the whole image. It receives the whole image if the checksum differs, or if
 /// the card was reset or lost. A picture never depends on earlier pictures.
 ///
-/// Cards are connected again if the settings have other cards, for each picture with modelled memory, after a
-/// failed render, and, if any card is remote, after some seconds without a picture.
+/// Cards are connected again in these cases: the settings have other cards; memory is modelled; the last
+/// render failed, unless its input was invalid or it was stopped; or a card is remote and some seconds have
+/// passed since the last picture.
 #[derive(Default)]
 pub struct Renderer {
     cards: Option<Cards>,
@@ -52,8 +53,8 @@ impl Renderer {
         Self { cards: None, kept: Some(kept) }
     }
 
-    /// Renders a picture of a scene. For another camera of the same scene neither triangles nor texels are
-    /// read.
+    /// Renders a picture of a scene. If only the camera differs from the last picture, its triangles and
+    /// texels are not read.
     ///
     /// # Errors
     /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
@@ -66,14 +67,14 @@ impl Renderer {
         self.render_by(scene, settings, None, None, observer)
     }
 
-    /// Adds samples to a picture: renders the samples that `base` lacks, and returns the picture with all
-    /// samples of the settings, which equals, bit for bit, the picture of a single render.
-    /// [`Integrator::planned_samples`] and everything else that pixels depend on must be equal to those of
-    /// the base.
+    /// Adds samples to the picture `base`. Renders the samples that `base` lacks, and returns the picture
+    /// with all samples of the settings. It equals, bit for bit, the picture of a single render.
+    /// [`Integrator::planned_samples`] and all other settings that pixels depend on must equal those of
+    /// `base`.
     ///
     /// # Errors
-    /// As [`Self::render`]; and if the base does not have fewer samples, or has another size, crop window or
-    /// other layers.
+    /// As [`Self::render`]; and if `base` does not have fewer samples than the settings, or has another size,
+    /// crop window or other layers.
     pub fn refine(
         &mut self,
         scene: &Scene,
@@ -89,8 +90,8 @@ impl Renderer {
         self.cards = None;
     }
 
-    /// Renders a picture of a scene with photons and an integrator that `choose` returns for the packed
-    /// scene, after the cards have answered.
+    /// Renders a picture of a scene, with photons and integrator chosen by `choose` for the packed scene.
+    /// `choose` is called after the cards have answered.
     ///
     /// # Errors
     /// As [`Self::render`], and the errors of `choose`.
@@ -205,7 +206,7 @@ fn connected<'c>(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<&'c mut Cards, RenderError> {
-    // Other cards are closed before new ones are connected: a card serves one host at a time.
+    // The open cards are closed before new ones are connected, because a card serves one host at a time.
     let open = cards.take().filter(|cards| cards.serve(settings));
     Ok(cards.insert(match open {
         Some(mut open) => {
@@ -216,7 +217,7 @@ fn connected<'c>(
     }))
 }
 
-/// A card image, and the inputs from which it was made.
+/// A card image kept for further pictures, and the inputs from which it was made.
 #[derive(Clone)]
 pub(super) struct Kept {
     /// Checksum of the scene ([`Scene::checksum_without_cameras`]).
@@ -241,7 +242,8 @@ pub(super) enum Source {
 }
 
 impl Source {
-    /// Determines the source of the card image, and the settings as stated or chosen.
+    /// Determines the source of the card image. Returns it with the settings, in which `choose` may have
+    /// replaced photons and integrator.
     pub(super) fn new(
         scene: &Scene,
         settings: &RenderSettings,
@@ -263,7 +265,7 @@ impl Source {
         Ok((RenderSettings { photons, integrator, ..settings.clone() }, Self::Packed(Box::new(packed))))
     }
 
-    /// Units of the sums in pixels.
+    /// Units of the sums of light and depth in pixels.
     fn sum_scale(&self) -> SumScale {
         match self {
             Self::Kept(kept) => kept.prepared.image.view().0.header.sum_scale(),

@@ -1,4 +1,4 @@
-//! Statistics of a render. The field names are the keys of their JSON.
+//! Statistics of a render. The names of the fields are the keys of the JSON file.
 
 use photoncard_cards::session::LinkBytes;
 use photoncard_map::photon_map::Guiding;
@@ -11,7 +11,7 @@ use super::work::{Outcome, Prepared, Times};
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
 
-/// Name, in a list of cards, of an earlier render whose finished tiles were kept.
+/// Name that stands for an earlier render in a list of cards, if tiles were taken over from its file.
 pub const EARLIER_RENDER: &str = "an earlier render";
 
 /// Contents of the statistics file. The keys are stable.
@@ -27,9 +27,9 @@ pub struct Statistics {
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: u64,
-    /// Number of paths traced from the lights for the photons.
+    /// Number of light paths traced for the photons.
     pub photon_paths: u64,
-    /// Guiding of the photon paths; absent if photons are for any camera.
+    /// Guiding of the photon paths to the camera; absent if photons are for any camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photon_guiding: Option<Guiding>,
     /// Maximum distance of a gather, metres.
@@ -40,18 +40,18 @@ pub struct Statistics {
     pub cards_given_up: usize,
     /// Number of tiles that two cards rendered with equal pixels.
     pub verified_tiles: usize,
-    /// Number of tiles rendered once more, for verification or because another card took too long. The other
-    /// counts include such a tile once.
+    /// Number of tiles that were rendered again, for verification or because another card took too long. The
+    /// other counts include such a tile once.
     pub repeated_tiles: usize,
-    /// Number of tiles with light far above that of the scene's surfaces that no second card verified,
-    /// including tiles kept from an earlier render.
+    /// Number of dazzling tiles that no second card verified, including tiles kept from an earlier render.
+    /// Their light is far above that of the scene's surfaces.
     pub dazzling_tiles: usize,
-    /// Names of the cards that rendered the [`dazzling_tiles`](Self::dazzling_tiles), and [`EARLIER_RENDER`]
-    /// if an earlier render did.
+    /// Names of the cards that rendered the [`dazzling_tiles`](Self::dazzling_tiles). [`EARLIER_RENDER`]
+    /// stands for an earlier render.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
-    /// Number of tiles rendered again because their card was outvoted. The other counts include such a tile
-    /// once.
+    /// Number of tiles rendered again because their card was outvoted or sent wrong messages. The other
+    /// counts include such a tile once.
     pub revoked_tiles: usize,
     /// Time of each phase, seconds.
     pub time_s: Times,
@@ -70,8 +70,8 @@ pub struct Statistics {
     pub records: u64,
     /// Number of irradiance records reused from an earlier pass.
     pub kept_records: u64,
-    /// Fraction of samples with interpolated irradiance among those that see a surface with a Lambertian
-    /// part.
+    /// Number of samples with interpolated irradiance, divided by that of samples that see a surface with a
+    /// Lambertian part.
     pub interpolated_share: f64,
     /// Number of photons whose distance was computed.
     pub photons_tested: u64,
@@ -89,8 +89,8 @@ pub struct Statistics {
     pub drains: u64,
     /// Maximum number of gathers that waited at the same time on any chip.
     pub most_waiting: u64,
-    /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`),
-    /// without searches for irradiance points.
+    /// Floating-point operations of the counted work, by the constants of the dissertation's Table 7.1
+    /// (`docs/scaling.md`). Searches for irradiance points are not included.
     pub flops: Flops,
     /// Size of the card image, bytes.
     pub image_bytes: u64,
@@ -105,7 +105,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Statistics of a finished render.
+    /// Statistics of a render that has finished or failed.
     pub(super) fn new(
         settings: &RenderSettings,
         frame: &FrameParameters,
@@ -164,8 +164,8 @@ impl Statistics {
     }
 }
 
-/// Number of photons in the map of a card image, of `count` requested ones. They are counted only if the map
-/// has no room for `count` photons.
+/// Number of photons in the map of a card image. It is the requested number `count` if the map has room for
+/// it; otherwise the photons are counted.
 fn photons(count: u64, prepared: &Prepared) -> u64 {
     let leaves = prepared.image.section(SectionKind::PhotonLeaves);
     let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
@@ -180,8 +180,8 @@ fn photons(count: u64, prepared: &Prepared) -> u64 {
 /// Numbers of rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// Number of eye rays: two per sample, more for samples that see their surface through specular ones, and
-    /// those to lattice points of the irradiance cache.
+    /// Number of eye rays: two per path in pixels with gather rays and one in others, more for surfaces seen
+    /// by specular reflection or refraction, and one per visited lattice point of the irradiance cache.
     pub eye: u64,
     /// Number of shadow rays.
     pub shadow: u64,
@@ -193,12 +193,12 @@ pub struct Rays {
     pub specular: u64,
 }
 
-/// Bytes transferred over all links.
+/// Statistics of the links to all cards.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatistics {
     /// Bytes of card image lines sent to each card. Only lines that the card lacked are sent.
     pub image_bytes: Vec<u64>,
-    /// Bytes of card image lines sent and of pixels received.
+    /// Bytes of card image lines sent to cards and of pixels received from them, over all links.
     pub payload_bytes: u64,
     /// Total number of bytes in both directions.
     pub wire_bytes: u64,
@@ -215,7 +215,6 @@ pub struct LinkStatistics {
 }
 
 impl LinkStatistics {
-    /// Statistics of the links of all cards.
     fn new(links: &[LinkBytes]) -> Self {
         let mut sum = LinkBytes::default();
         links.iter().for_each(|link| sum.add(link));

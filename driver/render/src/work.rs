@@ -1,4 +1,4 @@
-//! Work of a picture: its card image, the work of the cards, the outcome, and the time of each phase.
+//! Work of cards on a picture: the preparation of the card image, the outcome, and the time of each phase.
 
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -34,11 +34,11 @@ pub(super) struct Work<'a> {
     pub(super) frame: &'a FrameParameters,
     /// All tiles of the picture.
     pub(super) tiles: Vec<Tile>,
-    /// Film of the picture, which is one of the sinks. It contains the tiles of the resumed render.
+    /// Film of the picture, one of the sinks. It already contains the tiles taken over from a resumed render.
     pub(super) film: &'a Mutex<Film>,
     /// Destinations of finished tiles.
     pub(super) sinks: Vec<&'a dyn TileSink>,
-    /// Outputs that are polled during the work.
+    /// Outputs that are checked for failures during the work.
     pub(super) outputs: &'a Outputs<'a>,
 }
 
@@ -54,10 +54,11 @@ pub(super) struct Outcome {
     pub(super) cards: usize,
     /// Number of cards that were given up, left out because of their budget, or never answered the greeting.
     pub(super) cards_given_up: usize,
-    /// Numbers of tiles that were rendered more than once or taken over.
+    /// Numbers of tiles that were taken over, verified, repeated or revoked.
     pub(super) tiles: TileCounts,
-    /// Names of cards that rendered dazzling tiles which no other card verified, with the number of such
-    /// tiles. Kept tiles count for [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
+    /// Names of cards with dazzling tiles that no other card verified, and the number of these tiles. The
+    /// light of a dazzling tile is far above that of the scene's surfaces. Tiles taken over from a file count
+    /// for [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
     pub(super) dazzling: Vec<(String, usize)>,
     /// Error that ended the work. The other fields describe the work until then.
     pub(super) failure: Option<RenderError>,
@@ -67,7 +68,7 @@ pub(super) struct Outcome {
     pub(super) render_seconds: f64,
 }
 
-/// Card image, and the frame parameters that are derived from it.
+/// Card image, and the parameters of its photon maps.
 #[derive(Clone)]
 pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
@@ -75,9 +76,9 @@ pub(super) struct Prepared {
     pub(super) max_distance: f32,
     /// Parameters of gathers in the caustic map.
     pub(super) caustics: Option<CausticGather>,
-    /// Number of paths that were traced for the photons.
+    /// Number of light paths that were traced for the photons.
     pub(super) paths: u64,
-    /// Guiding of the photon paths; `None` if photons are for any camera.
+    /// Guiding of the photon paths to the camera; `None` if photons are for any camera.
     pub(super) guiding: Option<Guiding>,
 }
 
@@ -131,7 +132,8 @@ pub struct Times {
     pub hierarchy: f64,
     /// Part of `pack` for the photon map.
     pub photon_map: f64,
-    /// Part of `pack` to measure the maximum distance of gathers, and disc fractions.
+    /// Part of `pack` to measure the maximum distance of gathers, and the factors that correct the area of a
+    /// gather at edges and in corners.
     pub discs: f64,
     /// Part of `pack` for irradiance points, if irradiance is precomputed.
     pub irradiance: f64,

@@ -1,5 +1,5 @@
 //! Files of Blender's glTF exporter: recognition by `asset.generator`, units and falloff of its lights, and
-//! what its default settings leave out.
+//! help about contents that its default settings leave out.
 
 use super::light_units::LightUnits;
 
@@ -43,10 +43,10 @@ fn version(text: &str) -> Option<(u32, u32)> {
 /// Cosine of the inner cone angle at which glTF's spot falloff has the flux of Blender's. Arguments are the
 /// angles of the inner and outer cone that the exporter wrote, radians, and the cosine of the outer one.
 ///
-/// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine, from 0
-/// at `cos outer` to 1 over a width of `blend (1 - cos outer)`; its integral over the width is 1/2. The
-/// integral of glTF's squared ramp is 1/3. The flux is equal if the inner cone takes up 3/4 of the remaining
-/// width.
+/// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine from 0
+/// at `cos outer` to 1 at `cos outer + w`, where `w = blend (1 - cos outer)`. Its integral over the width `w`
+/// is `w / 2`. The integral of glTF's squared ramp over a width `v` is `v / 3`. The spots have equal flux for
+/// `v = 3 w / 4`.
 pub(super) fn inner_cosine(inner: f32, outer: f32, outer_cosine: f32) -> f32 {
     let blend = 1.0 - inner / outer;
     outer_cosine + 0.75 * blend * (1.0 - outer_cosine)

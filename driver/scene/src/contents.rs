@@ -42,34 +42,34 @@ pub struct SceneContents {
     pub environment: Option<Environment>,
     /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
     pub cameras: Vec<Camera>,
-    /// Program that wrote the file (`asset.generator`), if it says so.
+    /// Program that wrote the file (`asset.generator`); `None` if the file does not name it.
     pub generator: Option<String>,
-    /// Names of the file's variants of materials.
+    /// Names of the file's material variants (`KHR_materials_variants`).
     pub variants: Vec<String>,
-    /// Orthographic cameras of the file, which are not rendered: the number of perspective cameras before
-    /// each, and its name.
+    /// Orthographic cameras of the file, which are not rendered: for each, the number of perspective cameras
+    /// before it, and its name.
     pub orthographic: Vec<(usize, String)>,
     /// Sentences about missing contents of the file and about contents that the renderer ignores, each once.
     pub notices: Vec<String>,
     /// Notices that matter only to some pictures: index in [`Self::notices`], and the subject.
     pub concerns: Vec<(usize, Concern)>,
-    /// Sentences about contents of the file that the renderer interprets in another way than they are stated,
+    /// Sentences about contents of the file that the renderer does not interpret as the file states them,
     /// each once.
     pub remarks: Vec<String>,
     /// Number of triangles of zero area, which were left out.
     pub skipped_triangles: usize,
 }
 
-/// Subject of a notice that matters only to pictures that use it.
+/// Subject of a notice that matters only to pictures that use the subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Concern {
-    /// Default view. A picture that states its view does not use it.
+    /// Default view, which a picture uses if no view is given for it.
     View,
-    /// Cameras that cannot be used, in a file that has others.
+    /// Unusable cameras of a file that also has usable ones.
     OtherCameras,
-    /// Animations. A picture of the scene at rest does not use them.
+    /// Animations, which a picture of the scene without animation does not use.
     Animations,
-    /// Environment light of the file. A picture may replace it by that of another file.
+    /// Environment light of the file. A picture may use that of another file instead.
     Environment,
 }
 

@@ -1,8 +1,9 @@
-//! Lifts lamps off surfaces in the same plane, such as a panel that is modelled in the plane of the ceiling.
+//! Lifts lamps (emissive triangles) off surfaces in the same plane, such as a panel that is modelled in the
+//! plane of the ceiling.
 //!
-//! Rounding decides which of two coplanar surfaces a ray meets. An emissive triangle is therefore lifted off
-//! the other surface by more than the rounding error, so that it is seen whole, shadow rays reach it, and its
-//! photons start in front.
+//! Rounding decides which of two coplanar surfaces a ray meets. A lamp is therefore lifted off the other
+//! surface by more than the rounding error. It is then seen whole, shadow rays reach it, and its photons
+//! start in front of the other surface.
 
 use glam::{DVec2, DVec3, Vec3};
 use photoncard_picture::allocation::{self, OutOfMemory};
@@ -14,7 +15,7 @@ use super::{Scene, Triangle};
 /// absolute coordinate.
 const SHARED: f64 = 16.0;
 /// Distance by which a lamp is lifted, in units of `f32::EPSILON` times the sum of the lamp's greatest
-/// absolute coordinate and its viewing distance.
+/// absolute coordinate and the viewing distance of `SEEN_FROM`.
 const LIFT: f64 = 64.0;
 /// Greatest viewing distance at which a lifted lamp is seen whole, in units of the lamp's longest edge.
 const SEEN_FROM: f64 = 32.0;
@@ -24,7 +25,7 @@ impl Scene {
     /// emit. Double-sided emissive triangles are lifted to the front of a one-sided surface.
     ///
     /// # Errors
-    /// If the process cannot have the memory.
+    /// If the system refuses the memory.
     pub(crate) fn lift_lamps(&mut self) -> Result<(), OutOfMemory> {
         // The factor is 4, because a list's capacity may be twice its length, and a split copies half of the
         // list.
@@ -128,7 +129,7 @@ impl Lamp {
         Self { index, triangle: *triangle, bounds: Box3::of(triangle) }
     }
 
-    /// Returns whether `surface` lies in the lamp's plane and shares more than an edge with the lamp.
+    /// Returns whether `surface` lies in the lamp's plane and overlaps the lamp by more than an edge.
     fn is_covered_by(&self, surface: &Triangle) -> bool {
         let up = normal(&self.triangle);
         let [lamp, surface_corners] =

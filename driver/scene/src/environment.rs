@@ -18,8 +18,8 @@ use crate::error::SceneError;
 
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
-/// Radiance from infinitely far, W/(sr m^2) per linear RGB channel: an equirectangular map, constant if it is
-/// 1 x 1.
+/// Equirectangular map of radiance from infinitely far, W/(sr m^2) per linear RGB channel. A map of 1 x 1
+/// texels is constant in all directions.
 ///
 /// Column u, 0 to 1 from the left, and row v, 0 to 1 from the top, show the direction `(sin(theta) sin(phi),
 /// cos(theta), -sin(theta) cos(phi))` with `phi = 2 pi (u - 0.5)` and `theta = pi v`: y is up, and the middle
@@ -98,8 +98,8 @@ impl Environment {
         Self { width, height, texels, strength: 1.0 }
     }
 
-    /// Clamps invalid channels. Returns the number of texels that have any; `None` if channels are infinite
-    /// and no finite one is above 0.
+    /// Clamps invalid channels. Returns the number of texels with invalid channels; `None` if channels are
+    /// infinite and no finite one is above 0.
     fn clamp(&mut self) -> Option<usize> {
         let is_bad = |texel: &&mut [f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
         let finite = self.texels.iter().flatten().filter(|value| value.is_finite());
@@ -116,8 +116,8 @@ impl Environment {
         Some(clamped)
     }
 
-    /// Returns the environment turned about +y, counter-clockwise seen from above. Texels are interpolated if
-    /// the angle is no whole number of columns.
+    /// Returns the environment turned about +y by an angle in degrees, counter-clockwise seen from above.
+    /// Texels are interpolated if the angle is no whole number of columns.
     #[must_use]
     pub fn turned(mut self, degrees: f32) -> Self {
         let width = self.width as usize;
@@ -140,7 +140,7 @@ impl Environment {
         self
     }
 
-    /// Returns whether every row has one radiance, so that a turn about +y changes nothing.
+    /// Returns whether the texels of each row are equal, so that a turn about +y changes nothing.
     pub fn is_equal_around(&self) -> bool {
         let rows = self.texels.chunks_exact((self.width as usize).max(1));
         rows.into_iter().all(|row| row.iter().all(|texel| Some(texel) == row.first()))

@@ -64,13 +64,13 @@ impl fmt::Display for Location {
     }
 }
 
-/// A scene that cannot be loaded, or a setting that cannot be applied to it.
+/// Error of a scene that cannot be loaded, or of a setting that cannot be applied to it.
 ///
 /// Every variant names the location and, as its help, the remedy.
 #[derive(Debug, Error, Diagnostic)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// Error of a scene file, or a file it refers to, that cannot be read.
+    /// Error of a file that cannot be read: the scene file, a file that it refers to, or an environment map.
     #[error("cannot read {}", file.display())]
     #[diagnostic(code(scene::unreadable), help("check that the path names a file and that it may be read"))]
     Unreadable {
@@ -99,7 +99,7 @@ pub enum SceneError {
         file: PathBuf,
         /// Kind of file at the path, such as `a folder` or `an FBX file`.
         what: &'static str,
-        /// Remedy. Where a program converts the format to glTF, it contains the command.
+        /// Remedy, with the command of a program that converts the format to glTF, if there is one.
         remedy: String,
     },
 
@@ -235,7 +235,7 @@ pub enum SceneError {
         vertices: u64,
     },
 
-    /// Error of a scene with more triangles than a card image can address.
+    /// Error of a scene with more triangles than a card can address.
     #[error("{}: more than {limit} triangles once every instance is placed", file.display())]
     #[diagnostic(code(scene::too_many_triangles), help("simplify the meshes or place fewer instances"))]
     TooManyTriangles {
@@ -245,7 +245,7 @@ pub enum SceneError {
         limit: usize,
     },
 
-    /// Error of a scene that exceeds a card's memory even without photons.
+    /// Error of a scene that exceeds a card's memory even without a photon map.
     #[error("{}: {what} take {needed} bytes of a card's memory or more, and the card has {available}", file.display())]
     #[diagnostic(
         code(scene::too_large),
@@ -256,15 +256,15 @@ pub enum SceneError {
     TooLarge {
         /// Path of the scene file.
         file: PathBuf,
-        /// Contents of the card image that exceed the memory, such as `8 materials`.
+        /// Contents of the scene that exceed the card's memory, such as `8 materials`.
         what: String,
-        /// Lower bound of the card image's size, bytes.
+        /// Lower bound of the memory that the scene takes on the card, bytes.
         needed: u64,
         /// Size of the card's memory, bytes.
         available: u64,
     },
 
-    /// Error of a step of loading whose memory the system refuses.
+    /// Error of memory that a step of loading needs and the system refuses.
     #[error("{}: {step} takes {bytes} bytes of memory, which the system does not give", file.display())]
     #[diagnostic(code(scene::memory), help("simplify the scene, or {}", allocation::REMEDY))]
     Memory {
@@ -345,7 +345,7 @@ pub enum SceneError {
         remedy: String,
     },
 
-    /// Error of an orthographic camera.
+    /// Error of a requested camera that is orthographic.
     #[error("the camera '{name}' is orthographic, and only perspective cameras are rendered")]
     #[diagnostic(code(scene::orthographic), help("{remedy}"))]
     OrthographicCamera {
@@ -401,7 +401,7 @@ pub enum SceneError {
 }
 
 impl SceneError {
-    /// Error of a step of loading whose memory the system refuses.
+    /// Creates the error of memory that a step of loading needs and the system refuses.
     pub(crate) fn memory(file: &Path, step: &'static str, OutOfMemory { bytes }: OutOfMemory) -> Self {
         Self::Memory { file: file.to_owned(), step, bytes }
     }

@@ -5,14 +5,15 @@ use glam::Vec3;
 
 use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
-/// Layers of a material. Every texture is an index into [`Scene::textures`](super::SceneContents::textures),
-/// and multiplies the value that it varies.
+/// Layers of a material beyond its base. Textures are indices into
+/// [`Scene::textures`](super::SceneContents::textures); the texels of a roughness texture, for example,
+/// multiply the roughness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
     /// Normal map of the base.
     pub normal: Option<NormalMap>,
-    /// F0 of the dielectric before it is limited to 1, without `specularFactor`: F0 of the index of
-    /// refraction times `specularColorFactor` (`KHR_materials_specular`).
+    /// F0 of the dielectric (`KHR_materials_specular`) before `specularFactor` and the limit of 1 are
+    /// applied: `((ior - 1) / (ior + 1))^2 specularColorFactor`.
     pub specular: Vec3,
     /// Texture of `specularFactor`, in alpha.
     pub specular_texture: Option<u32>,
@@ -22,7 +23,7 @@ pub struct Layers {
     pub coat: Option<Coat>,
     /// Sheen below the coat.
     pub sheen: Option<Sheen>,
-    /// Texture of the transmitted share, in red.
+    /// Texture of the transmission factor, in red.
     pub transmission_texture: Option<u32>,
     /// Diffuse transmission.
     pub diffuse_transmission: Option<DiffuseTransmission>,
@@ -72,7 +73,7 @@ pub struct DiffuseTransmission {
     pub factor: f32,
     /// Colour of the transmitted light, 0 to 1.
     pub colour: Vec3,
-    /// Texture of the transmitted share, in alpha.
+    /// Texture of the factor, in alpha.
     pub factor_texture: Option<u32>,
     /// Texture of the colour (sRGB).
     pub colour_texture: Option<u32>,
@@ -94,7 +95,8 @@ impl Layers {
         }
     }
 
-    /// Normal texture whose coordinates define tangents: that of the base or, without one, that of the coat.
+    /// Index of the normal texture whose coordinates define the tangents: the base's or, without one, the
+    /// coat's.
     pub(super) fn tangent_texture(&self) -> Option<u32> {
         let coat_normal = self.coat.and_then(|coat| coat.normal);
         self.normal.or(coat_normal).map(|map| map.texture)
@@ -115,8 +117,8 @@ impl Layers {
             .flatten()
     }
 
-    /// Replaces every texture index by its `renumbered` value; `None` removes the texture. It destructures
-    /// all fields, so that a new one cannot be forgotten.
+    /// Replaces every texture index `i` by `renumbered(i)`; `None` removes the texture. All fields are
+    /// destructured, so that the compiler reports a new field that is not handled.
     pub(super) fn renumber(&mut self, renumbered: impl Fn(u32) -> Option<u32>) {
         let Self {
             normal,

@@ -1,8 +1,7 @@
 //! Loaded scenes: triangles, instances, materials, textures, lights and cameras in world space.
 //!
-//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
-//! Coordinates are relative to the scene's own origin, which lies at [`SceneContents::offset`] in the file,
-//! because single precision is coarse far from an origin.
+//! Coordinates are relative to the scene's own origin, which lies at [`SceneContents::offset`] in the file's
+//! coordinates. This origin is near the contents, because single precision is coarse far from an origin.
 #![forbid(unsafe_code)]
 
 mod blender;
@@ -53,10 +52,10 @@ pub use self::texture::{Encoding, Image, MAX_SIDE, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
-/// Name of the default camera.
+/// Name of the camera that is added to a scene without perspective cameras.
 const FRAMED: &str = "framed";
 
-/// Remedy of a scene without light.
+/// Help of the error that the scene has no light.
 const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFactor above 0 (and KHR_materials_emissive_strength \
                         for its radiance), place a light of KHR_lights_punctual, or add an environment: --environment 1,1,1 \
                         is a white sky";
@@ -110,8 +109,8 @@ impl Scene {
         self
     }
 
-    /// Creates a stand-in for a scene of which only the cameras, the offset, and the checksums with and
-    /// without cameras are known, and whether it is specular.
+    /// Creates a scene without triangles that has these cameras and this offset, and returns the given values
+    /// instead of computing them. `checksums` are the results of `checksum` and `checksum_without_cameras`.
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,
@@ -124,7 +123,7 @@ impl Scene {
         Self { contents, known }
     }
 
-    /// Replaces the cameras. Checksums of triangles and texels stay known.
+    /// Replaces the cameras, and keeps the checksums that do not depend on them.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>) {
         self.contents.cameras = cameras;
         self.known.checksum = OnceLock::new();
@@ -136,7 +135,7 @@ impl Scene {
     }
 
     /// CRC-32C of all contents that a render reads except the cameras, as eight hexadecimal digits. It covers
-    /// everything that the card image depends on.
+    /// everything that determines the scene's binary image in a card's memory.
     pub fn checksum_without_cameras(&self) -> &str {
         self.known.without_cameras.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &[]))
     }
@@ -145,7 +144,8 @@ impl Scene {
         self.known.bulk.get_or_init(|| self.contents.bulk_checksum()).clone()
     }
 
-    /// Notices that matter to a picture; `uses` returns whether the picture uses a subject.
+    /// Returns the notices without those about subjects that a picture does not use. `uses` returns whether
+    /// the picture uses a subject.
     pub fn notices_on(&self, uses: impl Fn(Concern) -> bool) -> Vec<&str> {
         let is_idle =
             |index: usize| self.concerns.iter().any(|&(notice, concern)| notice == index && !uses(concern));
@@ -153,11 +153,10 @@ impl Scene {
         notices.filter(|(index, _)| !is_idle(*index)).map(|(_, notice)| &**notice).collect()
     }
 
-    /// Converts a position from the scene's coordinates to the file's, metres. Without an offset the result
-    /// prints as the argument does.
+    /// Converts a position from the scene's coordinates to the file's, metres. If the offset is 0, the result
+    /// has the argument's shortest decimal form.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
-        // Of the double-precision numbers that round to a coordinate, the one that equals the coordinate's
-        // shortest decimal form is taken.
+        // Takes the double-precision number that is nearest to the coordinate's shortest decimal form.
         let decimal = |value: f32| value.to_string().parse().unwrap_or(f64::from(value));
         DVec3::from_array(place.to_array().map(decimal)) + self.offset
     }
@@ -256,9 +255,9 @@ impl Scene {
         blender::is_exporter(self.generator.as_deref())
     }
 
-    /// Rotation about +y, degrees, counter-clockwise seen from above, that aligns an environment map with the
-    /// conventions of the program that wrote the file. The middle of a map is +x in Blender and -z in glTF
-    /// viewers.
+    /// Rotation of an environment map about +y, degrees, counter-clockwise seen from above. It aligns the map
+    /// with the conventions of the program that wrote the scene file: the middle of a map is +x in Blender,
+    /// and -z in glTF viewers.
     pub fn environment_turn(&self) -> f32 {
         if self.is_of_blender() { -90.0 } else { 0.0 }
     }
@@ -271,19 +270,19 @@ impl Scene {
         })
     }
 
-    /// Returns for each material whether it focuses light: it reflects or transmits perfectly specularly, or
-    /// has a lobe that rays follow.
+    /// Returns for each material whether it focuses light. It does if it is a mirror or transmits light, has
+    /// a coat or a sheen, or has a narrow lobe ([`Self::has_narrow_lobe`]).
     pub fn specular_materials(&self) -> Vec<bool> {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
 
-    /// Returns whether a material has a narrow lobe that rays follow, at some texel at least.
+    /// Returns whether the material's GGX lobe is narrow at one texel at least. Rays follow a narrow lobe.
     pub fn has_narrow_lobe(&self, material: &Material) -> bool {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }
 
-    /// Returns for each material whether its coverage is partial: it has cut-outs, or an alpha below 1 with
-    /// `alphaMode` `BLEND`.
+    /// Returns for each material whether light can pass its surfaces without scattering: it has cut-outs
+    /// (`alphaMode` `MASK`), or an alpha below 1 with `BLEND`.
     pub fn uncovered_materials(&self) -> Vec<bool> {
         let mut uncovered: Vec<bool> =
             self.materials.iter().map(|material| self.is_uncovered(material)).collect();
@@ -321,7 +320,8 @@ impl Scene {
         self.materials.iter_mut().for_each(|material| material.energy_compensation = true);
     }
 
-    /// Checks that the scene has a light. Call it once settings are applied and an environment is added.
+    /// Checks that the scene has a light. Call it after all settings are applied and the environment is
+    /// added.
     ///
     /// # Errors
     /// [`SceneError::NoLight`].

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// Point, spot or directional light in radiometric units. Those of a file are converted by its
+/// Point, spot or directional light in radiometric units. Lights of a file are converted from its
 /// [`LightUnits`](super::LightUnits).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {

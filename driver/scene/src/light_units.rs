@@ -8,9 +8,8 @@ const EFFICACY: f32 = 683.0;
 /// Units in which a file states punctual lights (`KHR_lights_punctual`).
 ///
 /// Emission of surfaces is always radiance in W/(sr m^2), and so is the constant radiance of an environment.
-/// [`Radiometric`](Self::Radiometric) fits two kinds of consistent files: those with lights in W/sr and
-/// W/m^2, and those with lights in cd and lx beside emission in cd/m^2, which differ by one factor of all
-/// light.
+/// [`Radiometric`](Self::Radiometric) suits files with lights in W/sr and W/m^2. It also suits files with
+/// lights in cd and lx and emission in cd/m^2; their pictures are brighter by a constant factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
     /// Chosen by the exporter in `asset.generator`: [`Photometric`](Self::Photometric) for Blender's,
@@ -22,8 +21,8 @@ pub enum LightUnits {
     Radiometric,
     /// Point and spot lights in cd, directional lights in lx; 683 lm are 1 W.
     Photometric,
-    /// Point and spot lights by their flux in W, as if they radiated in all directions; directional lights in
-    /// W/m^2.
+    /// Point and spot lights by their flux over all directions, W (intensity = flux / (4 pi)); directional
+    /// lights in W/m^2.
     Watts,
 }
 

@@ -1,8 +1,8 @@
 //! Limits of emission.
 
 /// Maximum emission in each channel: W/(sr m^2) of surfaces and the environment, W/sr or W/m^2 of punctual
-/// lights. It leaves single precision, up to 3e38, room for products.
+/// lights. Its product with a factor up to 1e18 fits in single precision.
 pub const BRIGHTEST: f32 = 1e20;
 
-/// Range of non-zero emission, which leaves single precision, 1e-38 to 3e38, room for products.
+/// Range of non-zero emission. Products with factors of 1e-18 to 1e18 fit in single precision.
 pub(super) const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=BRIGHTEST;

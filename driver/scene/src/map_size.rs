@@ -5,7 +5,8 @@ use std::fmt::Display;
 use super::raster::{Fault, check_size};
 use super::texture::MAX_SIDE;
 
-/// Maximum number of texels of an environment. A texel takes 12 bytes in the host and 4 more on a card.
+/// Maximum number of texels of an environment. A texel takes 12 bytes of the host's memory and 4 bytes of the
+/// card's.
 pub const MAX_ENVIRONMENT_TEXELS: u64 = 1 << 26;
 
 /// Checks a map's size against the limits.

@@ -8,7 +8,7 @@ use super::layers::Layers;
 use super::limits::EMISSION;
 use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
-/// Tolerance of the sum of the diffuse and specular albedo above 1, because files often state three digits.
+/// Maximum excess of the sum of the diffuse and specular albedo over 1. Files often state only three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
 
 /// Material of a surface: reflection, transmission, emission, textures and cut-outs.
@@ -129,9 +129,8 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
-    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors,
-    /// smooth coats, glass), or has a lobe that rays follow (a narrow one, a coat, a sheen). `texel` is the
-    /// minimum of its roughness texture, 1 without one.
+    /// Returns whether the material focuses light: it is a mirror or transmits light, has a coat or a sheen,
+    /// or has a narrow lobe. `texel` is the minimum of its roughness texture, 1 without one.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
         if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {
             return true;
@@ -199,7 +198,7 @@ impl Material {
     }
 }
 
-/// Returns whether a GGX lobe of this perceptual roughness is narrow.
+/// Returns whether a GGX lobe of this perceptual roughness is narrow enough for rays to follow it.
 fn is_narrow(roughness: f32) -> bool {
     roughness * roughness < NARROW_ALPHA
 }

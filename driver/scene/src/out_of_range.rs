@@ -5,7 +5,6 @@ use glam::Vec3;
 /// A value of a material that is out of its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
-    /// Property that is out of range.
     pub(super) property: Property,
     /// Description of the fault, as a clause.
     pub(super) reason: String,

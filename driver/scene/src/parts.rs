@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-/// Resolution of a triangle's angle around an edge, steps per radian. Coplanar triangles have the same step.
+/// Resolution of a triangle's angle around an edge, steps per radian. Triangles at the same step count as
+/// coplanar.
 const ANGLE_STEPS: f32 = 1e4;
 
 /// A connected part of a surface.
@@ -14,23 +15,23 @@ pub struct Part {
     pub(crate) is_closed: bool,
 }
 
-/// Edge of a triangle: the bits of the coordinates of its two ends, the lower first.
+/// Edge between two vertices: the bits of their coordinates, the lesser vertex first.
 type Ends = [[u32; 3]; 2];
 
-/// One triangle at an edge.
+/// Edge of one triangle, with the direction in which the triangle traverses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
     ends: Ends,
     triangle: u32,
     /// Corner of the triangle at which the edge begins.
     corner: usize,
-    /// True if the triangle traverses the edge from the lower end to the upper.
+    /// True if the triangle traverses the edge from the first of `ends` to the second.
     is_forward: bool,
 }
 
-/// Splits triangles into connected parts, in the order of their first triangles. Two triangles at an edge are
-/// connected. Of more triangles at an edge, as where solids touch, each pair is connected that has the inside
-/// of a solid between them.
+/// Splits triangles into connected parts, in the order of their first triangles. Two triangles that alone
+/// share an edge are connected. If more share it, as where solids touch, neighbours around the edge are
+/// connected if the inside of a solid lies between them.
 pub fn parts(triangles: &[[Vec3; 3]]) -> Vec<Part> {
     let mut sides: Vec<Side> =
         triangles.iter().zip(0..).flat_map(|(corners, index)| sides(corners, index)).collect();
@@ -76,7 +77,8 @@ fn sides(corners: &[Vec3; 3], triangle: u32) -> [Side; 3] {
     })
 }
 
-/// Pairs of neighbouring triangles around an edge between which the inside of a solid lies, behind both.
+/// Pairs of neighbouring triangles around an edge whose backs face each other: the inside of a solid lies
+/// between them.
 fn partners(triangles: &[[Vec3; 3]], around: &[Side]) -> impl Iterator<Item = [u32; 2]> {
     let Some(first) = around.first() else { unreachable!("an edge is a triangle's") };
     let [from, to] = first.ends.map(|end| Vec3::from_array(end.map(f32::from_bits)));
@@ -87,8 +89,8 @@ fn partners(triangles: &[[Vec3; 3]], around: &[Side]) -> impl Iterator<Item = [u
         .iter()
         .map(|side| {
             let across = triangles[side.triangle as usize][(side.corner + 2) % 3] - from;
-            // `u`, `v` and the axis are right-handed: a triangle that passes the edge forwards faces to
-            // greater angles.
+            // `u`, `v` and the axis are a right-handed basis. A triangle that traverses the edge forwards
+            // therefore faces greater angles.
             let angle = f32::atan2(across.dot(v), across.dot(u));
             let step = ((angle * ANGLE_STEPS).round() as i32).rem_euclid(turn);
             // Of triangles at one angle the forward ones come first, because the solid behind them is at

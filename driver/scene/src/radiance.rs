@@ -31,7 +31,7 @@ fn ends_early() -> Fault {
 
 struct Header {
     size: [u32; 2],
-    /// True where the file's first column is the rightmost one, and where its first row is the lowest.
+    /// Whether the file's first column is the rightmost one, and whether its first row is the lowest.
     flipped: [bool; 2],
     /// Factor by which the stored radiance was multiplied.
     exposure: f32,
@@ -62,8 +62,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     Ok((header.size, texels))
 }
 
-/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. A
-/// mantissa of 0 is 0, whereas some readers add 1/2 to it.
+/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. Some
+/// readers add 1/2 to every mantissa; this one does not.
 fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];

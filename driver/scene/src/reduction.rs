@@ -1,4 +1,4 @@
-//! Images of fewer texels.
+//! Reduction of images to fewer texels.
 
 use std::ops::Range;
 
@@ -7,15 +7,15 @@ use glam::{DVec4, Vec4};
 use crate::srgb::{Srgb, linear};
 use crate::texture::{Encoding, shared_exponent};
 
-/// Size of an image of which each side has at most `limit` texels: the sides divided by the smallest whole
-/// number, rounded up.
+/// Size of an image that is reduced to at most `limit` texels a side. Both sides are divided by the smallest
+/// whole number that suffices, and rounded up.
 pub(crate) fn reduced_size(size: [u32; 2], limit: u32) -> [u32; 2] {
     let [width, height] = size;
     let factor = width.max(height).div_ceil(limit.max(1));
     size.map(|side| side.div_ceil(factor))
 }
 
-/// Means of the texels of an image of size `from`, in linear light, on a grid of size `to`. Each texel
+/// Reduces an image of size `from` to size `to`. Each new texel is a mean in linear light; each old texel
 /// contributes to one mean. Colour and alpha are averaged separately, as in a GPU's mipmaps, so that the
 /// colour of a texel of alpha 0 counts.
 pub(crate) fn reduced(texels: &[[u8; 4]], encoding: Encoding, from: [u32; 2], to: [u32; 2]) -> Vec<[u8; 4]> {

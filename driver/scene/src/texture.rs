@@ -37,7 +37,7 @@ impl Texture {
     }
 }
 
-/// Wrap mode: the image beyond texture coordinates 0 to 1.
+/// Wrap mode: the content of a texture at coordinates outside 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
     /// The image repeated (`REPEAT`).

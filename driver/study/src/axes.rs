@@ -9,9 +9,9 @@ pub const MAX_POINTS: usize = 512;
 /// Setting that a sweep varies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Axis {
-    /// Name of the setting, equal to that of its option.
+    /// Name of the setting, as in its command-line option.
     pub name: String,
-    /// Values, as arguments of the option.
+    /// Values of the setting, written as arguments of the option.
     pub values: Vec<String>,
 }
 
@@ -88,8 +88,8 @@ impl Axes {
         &self.0
     }
 
-    /// Returns the combinations of values in the order of the sweep's points. A combination has the index of
-    /// a value for each axis.
+    /// Returns the combinations of values in the order of the sweep's points. A combination holds the index
+    /// of one value of each axis.
     pub(super) fn combinations(&self) -> impl Iterator<Item = Vec<usize>> {
         let count = self.0.iter().map(|axis| axis.values.len()).product();
         (0..count).map(|point| self.combination(point))
@@ -113,7 +113,7 @@ impl Axes {
         self.0.iter().zip(indices).fold(0, |point, (axis, index)| point * axis.values.len() + index)
     }
 
-    /// Returns the name and the value of each axis. `indices` has the index of the value on each axis.
+    /// Returns the name of each axis, with the axis's value at the index in `indices`.
     pub(super) fn values(&self, indices: &[usize]) -> Vec<(&str, &str)> {
         let pairs = self.0.iter().zip(indices);
         pairs.map(|(axis, &index)| (axis.name.as_str(), axis.values[index].as_str())).collect()

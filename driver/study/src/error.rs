@@ -43,7 +43,7 @@ pub enum StudyError {
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Report(#[from] ReportError),
-    /// The threads of the chips cannot be started.
+    /// The threads that emulate chips cannot be started.
     #[error("the chips' threads could not be started: {0}")]
     #[diagnostic(help("use fewer with --threads"))]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -53,8 +53,8 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// Returns whether the arguments or the scenes cause the error, rather than the work. The command's exit
-    /// status is then 2 instead of 1.
+    /// Returns whether the arguments or the scenes cause the error. The command's exit status is then 2
+    /// instead of 1.
     pub fn is_input(&self) -> bool {
         match self {
             Self::NoScene { .. }

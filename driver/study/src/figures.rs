@@ -19,8 +19,8 @@ const SCENE: &str = "cornell.gltf";
 /// Scale of [`check`]. At this scale the check takes about a second.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
-/// Measures figures on which all other figures depend: the versions of program and card image layout, and the
-/// exact number of bytes that two small renders fetch from DRAM. If these figures differ between two files,
+/// Measures figures that identify the program: the versions of program and card image layout, and the exact
+/// number of bytes that two small renders fetch from DRAM. If these figures differ between two files,
 /// different versions of the program made the files.
 ///
 /// # Errors
@@ -45,8 +45,9 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     Ok(figures)
 }
 
-/// Writes `figures.csv` into `folder`: the figures `check` that [`check`] measured, the settings that all
-/// points share, and the figures of studies. If `scale` has a banner, the figure `trial` has its text.
+/// Writes `figures.csv` into `folder`: the figures `check`, which the function [`check`] measured, the
+/// settings that all points share, and the figures of the studies. At a scale other than the nominal frame's,
+/// the figure `trial` holds the text that says so.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,5 +1,5 @@
-//! Measures the host's work for a frame whose photons differ from those of the previous frame: its time, and
-//! the changed lines of the card image.
+//! Measures the host's work for a frame with other photons than the previous frame: the time of the work, and
+//! the number of bytes that change in the card image.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -25,7 +25,7 @@ use super::store::PointStore;
 /// Displacement of moving lights, as a fraction of the scene's diagonal.
 pub(crate) const LIGHT_STEP: f32 = 0.01;
 
-/// Host's work for the photon map of one scene, and the effects of changes of the scene's light.
+/// Times of the host's work for the photon map of one scene, and the bytes that changes of light alter.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) struct HostFrame {
     /// Size of the card image, bytes.
@@ -38,9 +38,10 @@ pub(crate) struct HostFrame {
     pub(crate) tracing: f64,
     /// Time to build the map and the other sections of the card image, seconds.
     pub(crate) building: f64,
-    /// Time to measure the maximum distance of gathers and the disc fractions, seconds.
+    /// Time to measure the maximum radius of gathers, and the fractions of their discs that surfaces fill,
+    /// seconds.
     pub(crate) measuring: f64,
-    /// Effects of changes of the scene's light on the card image.
+    /// Bytes of the card image that each change of the scene's light alters.
     pub(crate) changes: Vec<Changed>,
 }
 
@@ -65,7 +66,6 @@ pub(crate) enum Change {
 /// Size of the lines of the card image that differ after a change.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) struct Changed {
-    /// The change of light.
     pub(crate) change: Change,
     /// Size of all changed lines, bytes.
     pub(crate) bytes: u64,
@@ -97,7 +97,7 @@ impl<'a> HostBench<'a> {
     }
 
     /// Measures the host's work for a frame of the scene in `file`, and the effects of `changes` on the card
-    /// image. If the store has the result, it is returned instead.
+    /// image. A result in the store is returned without a measurement.
     ///
     /// # Errors
     /// If the scene cannot be read, its photons cannot be mapped, the result cannot be stored, or the

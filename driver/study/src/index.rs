@@ -8,7 +8,8 @@ use super::error::StudyError;
 use super::report::{self, Block, Provenance, Report, Section};
 use super::studies::Study;
 
-/// Writes `index.html` into `folder`, which contains the folders of the studies.
+/// Writes the index page `index.html` into `folder`. Each study's report is in a subfolder with the study's
+/// name.
 pub(super) fn write(
     folder: &Path,
     banner: Option<String>,

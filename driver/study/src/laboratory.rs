@@ -1,5 +1,5 @@
-//! Measures points. Finished points are read from the store. Points with the same card image are measured
-//! together, so that photons are traced once for all of them.
+//! Measures points, except those whose results the store has already. Points with the same card image are
+//! measured one after another, so that photons are traced once for all of them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,11 @@ use super::point::{ImageKey, Point, Task};
 use super::quality::{Quality, Reference};
 use super::store::PointStore;
 
-/// Observer of a study's progress, which can stop it.
+/// Observer of a study's progress, which can stop the study.
 pub trait StudyObserver: Sync {
-    /// Reports that `done` of the study's `total` points are finished. The first call, with `is_new` false,
-    /// counts points in the store; then there is a call for each measured point.
+    /// Reports that `done` of the study's `total` points are finished. In the first call `is_new` is false,
+    /// and `done` is the number of points whose results are in the store. Then there is a call after each
+    /// measured point.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
     /// Reports in a sentence why a stored point cannot be used. The point is measured again.
@@ -34,9 +35,7 @@ pub trait StudyObserver: Sync {
 /// Result of measuring a point. The variant depends on the point's [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) enum Outcome {
-    /// Result of [`Task::Traffic`].
     Traffic(Measurement),
-    /// Result of [`Task::Quality`].
     Quality(Quality),
 }
 
@@ -45,7 +44,6 @@ pub(crate) enum Outcome {
 pub struct Results(Vec<(Point, Outcome)>);
 
 impl Results {
-    /// Collects the outcomes of points.
     pub(super) fn new(outcomes: Vec<(Point, Outcome)>) -> Self {
         Self(outcomes)
     }
@@ -84,9 +82,10 @@ pub struct Laboratory<'a> {
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
     loaded: HashMap<String, Scene>,
-    /// Card image of the last point. The next point may share it.
+    /// Card image of the last point, kept for a next point that needs the same image.
     last: Option<LastImage>,
-    /// Reference of the last point with [`Task::Quality`]. The next such point may share it.
+    /// Reference render of the last point with [`Task::Quality`], kept for a next point that needs the same
+    /// one.
     reference: Option<SceneReference>,
 }
 
@@ -96,8 +95,8 @@ struct LastImage {
     mapped: MappedImage,
 }
 
-/// A reference, and its inputs other than settings: the name of the scene, and the assignments to the scene's
-/// materials.
+/// A reference render, and what it depends on besides its settings: the name of the scene, and the
+/// assignments to the scene's materials.
 struct SceneReference {
     scene: String,
     assignments: Vec<String>,
@@ -160,7 +159,7 @@ impl<'a> Laboratory<'a> {
         self.loaded.insert(name.to_owned(), scene);
     }
 
-    /// Loads the scene of a file, before a point's assignments are applied.
+    /// Loads the scene of a file, without the changes of materials that a point makes.
     ///
     /// # Errors
     /// If the file is missing or cannot be read.
@@ -227,8 +226,8 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// Returns the card image for a point. It is that of the previous point if the image keys of both points
-    /// are equal, otherwise a new one.
+    /// Returns the card image for a point: the previous point's image if both points have equal image keys,
+    /// otherwise a new image.
     fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
         let key = point.image_key();
         if let Some(last) = self.last.take_if(|last| last.key == key) {

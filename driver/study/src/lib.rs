@@ -1,10 +1,10 @@
 //! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for
 //! machines that do not exist yet.
 //!
-//! A study is a list of [`Point`]s and a function from their [`Results`] to a report. [`run`] measures the
-//! points in a [`Laboratory`], which keeps their outcomes, and writes the report.
-//! [`photoncard_render::cost_model`] predicts the number of chips that a frame rate needs; `load_balance`
-//! simulates how evenly a picture's tiles load these chips.
+//! A study is a list of [`Point`]s, each a scene with settings to measure, and a function that turns their
+//! [`Results`] into a report. [`run`] measures the points in a [`Laboratory`], which stores their results,
+//! and writes the reports. [`photoncard_render::cost_model`] predicts the number of chips that a frame rate
+//! needs; `load_balance` simulates how evenly a picture's tiles load these chips.
 #![forbid(unsafe_code)]
 
 mod axes;
@@ -52,13 +52,14 @@ use photoncard_scene::{Scene, SceneContents};
 pub struct StudyOptions {
     /// Studies to run, in this order.
     pub studies: Vec<Study>,
-    /// Scale of all studies.
+    /// Settings that all studies have in common.
     pub scale: Scale,
     /// Folder of the scenes.
     pub scenes: PathBuf,
     /// Folder of the reports.
     pub out: PathBuf,
-    /// True if each report has its own folder in [`Self::out`], and an index page links them.
+    /// True if each report has its own folder in [`Self::out`], and an index page links them. If false,
+    /// reports are written into [`Self::out`] itself.
     pub is_collection: bool,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
@@ -66,8 +67,9 @@ pub struct StudyOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports the studies, and writes their key figures into `figures.csv`. Finished
-/// points are kept in the folder `points` of [`StudyOptions::out`], where a later run finds them.
+/// Measures the points of all studies, and writes a report for each study and `figures.csv` with the key
+/// figures of all. Results are stored in the folder `points` of [`StudyOptions::out`], so that a later run
+/// does not measure the same points again.
 ///
 /// # Errors
 /// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the
@@ -99,7 +101,7 @@ pub struct SweepOptions {
     pub sweep: Sweep,
     /// Name of the scene of all points.
     pub name: String,
-    /// Scene before a point's assignments are applied.
+    /// Scene, without the changes of materials that a point makes.
     pub scene: Scene,
     /// Folder of the report.
     pub out: PathBuf,
@@ -111,8 +113,8 @@ pub struct SweepOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports a sweep. All points are checked before the first is measured. Finished points are
-/// kept, as in [`run`].
+/// Measures all points of a sweep and writes its report. All points are checked before the first is measured.
+/// Results are stored as by [`run`].
 ///
 /// # Errors
 /// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::sample::{Chosen, Estimate, SampleRate, choose};
 use super::whole_frame::WholeFrame;
 
-/// Reads of one structure of card memory.
+/// Sums over a chip's reads of some structures (kinds of data) in card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReadSums {
     /// Number of read requests by the chip.
@@ -35,11 +35,11 @@ pub struct TileMeasurement {
     pub tile: u32,
     /// Weight of the tile: the number of tiles in the picture that it represents, including itself.
     pub stands_for: usize,
-    /// Counters of the work.
+    /// Counts of the chip's work, such as rays and gathers.
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
     pub reads: [ReadSums; STRUCTURES],
-    /// Contents of the lines that the chip read.
+    /// Counts of the nodes, triangles, photons and other data in the lines of memory that the chip read.
     pub contents: Contents,
 }
 
@@ -93,7 +93,7 @@ impl TileMeasurement {
 }
 
 impl Measurement {
-    /// Estimates the total of a count over the whole picture.
+    /// Estimates the sum of `count` over all tiles of the picture from the measured tiles.
     pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
         let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
         Estimate::of_total(&sample)
@@ -127,7 +127,6 @@ impl Measurement {
 
 /// Bench of emulated chips: a scene, its card image, and threads that emulate the chips.
 pub(crate) struct Bench<'a> {
-    /// Scene of the bench.
     pub(crate) scene: &'a Scene,
     /// Card image of the scene, with its photon map.
     pub(crate) mapped: &'a MappedImage,
@@ -148,8 +147,8 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders `tiles` on chips of the kind `chip`. With `caches` the memory is modelled, and the caches are
-    /// empty when a tile begins.
+    /// Renders `tiles` on chips of the kind `chip`. If `caches` is given, the memory is modelled with these
+    /// caches, which are empty when a tile begins.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
@@ -164,8 +163,8 @@ impl Bench<'_> {
         Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, caches, self.is_stopped)?)
     }
 
-    /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
-    /// several are in flight.
+    /// Measures the work and memory traffic of a frame, from a sample of its tiles. If a chip has several
+    /// tiles in flight in a gather queue, one chip renders all tiles.
     ///
     /// # Errors
     /// If the scene has no camera with the name in the settings, the card image is malformed, or the bench is
@@ -197,7 +196,7 @@ impl Bench<'_> {
     }
 
     /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows.
-    /// The reads of a tile then depend on the tiles that are in flight with it.
+    /// The result is one sum, because a tile's reads depend on the other tiles in flight.
     fn in_flight(
         &self,
         chip: EmulatedKind,

@@ -18,7 +18,8 @@ pub const ALONG_CURVE: &str = "hilbert";
 /// A measurement of a scene, with all settings that its result depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Name of the scene in the laboratory: its file in the folder of scenes.
+    /// Name of the scene: its file in the folder of scenes, or the name under which it was added to the
+    /// laboratory.
     pub scene: String,
     /// Assignments to the scene's materials, such as `floor.exponent=8`.
     pub assignments: Vec<String>,
@@ -42,7 +43,7 @@ pub enum Task {
         /// Caches between chip and DRAM.
         caches: CacheSettings,
         /// Fraction of the tiles to render. A frame [along a curve](Point::is_along_curve), or with several
-        /// tiles in flight, is rendered as a whole regardless.
+        /// tiles in flight, is always rendered as a whole.
         sample: SampleRate,
         /// Minimum number of tiles to render, if the picture has that many.
         least_tiles: usize,
@@ -93,7 +94,7 @@ impl Point {
         if self.is_along_curve { ALONG_CURVE } else { self.settings.schedule.order.name() }
     }
 
-    /// Returns whether gathers wait in a chip's queue.
+    /// Returns whether gathers wait in a chip's queue before they are performed.
     pub(super) fn has_queue(&self) -> bool {
         !self.is_along_curve && self.settings.schedule.order.has_queue()
     }

@@ -1,8 +1,8 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
 //! Sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels. The
-//! order of gathers, tiles, the layout of the photon map and caches do not. The light that is compared is
-//! that which gather rays bring from the photon map:
+//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that gather rays
+//! bring from the photon map is compared:
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
@@ -49,19 +49,19 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Root mean square error over pixels and channels, relative to the reference's mean, without the
-    /// reference's noise; 0 if that noise exceeds the difference.
+    /// Root mean square error over pixels and channels, divided by the reference's mean. The reference's
+    /// estimated noise is subtracted from the squared differences; the error is 0 if the noise is greater.
     pub fn rmse(&self) -> f64 {
         let TileDeviation { squares, noise, .. } = self.total();
         self.relative((squares - noise).max(0.0))
     }
 
-    /// Root mean square of the reference's noise, relative to the reference's mean.
+    /// Root mean square of the reference's noise, divided by the reference's mean.
     pub(crate) fn reference_noise(&self) -> f64 {
         self.relative(self.total().noise)
     }
 
-    /// Ratio of the means of the pixels and of the reference; 1 without bias.
+    /// Mean of the pixels divided by the mean of the reference; 1 without bias.
     pub fn mean(&self) -> f64 {
         let TileDeviation { sum, reference, .. } = self.total();
         sum / reference
@@ -97,12 +97,12 @@ const TILE: u32 = 16;
 struct ReferencePixel {
     /// Indirect light, W/(sr m^2).
     light: [f64; 3],
-    /// Estimated squared noise of the light.
+    /// Estimated variance of the light, summed over the channels.
     noise: f64,
 }
 
-/// Reference picture of indirect light with many gather rays. It has the pixels that show a lit surface and
-/// no emitter.
+/// Reference picture of indirect light with many gather rays. Pixels that show an emitter or no lit surface
+/// are excluded.
 ///
 /// It is the mean, weighted by rays, of two renders with `n` and `m` rays and different strata. If their
 /// errors are independent and their variances are `v / n` and `v / m`, the squared difference of the two is
@@ -123,7 +123,7 @@ fn halves(rays: u32) -> [u32; 2] {
 
 impl Reference {
     /// Renders `tiles` tiles with `rays` gather rays per pixel, combined sampling, no irradiance cache, and
-    /// density estimates. Eye rays are those of `settings`.
+    /// density estimates instead of precomputed radiance. Eye rays are those of `settings`.
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is
@@ -182,7 +182,7 @@ impl Reference {
 
 impl ReferencePixel {
     /// Creates a pixel from its light in two renders: the mean of `lights`, weighted by the numbers of rays
-    /// `rays`, and the noise of this mean.
+    /// `rays`, and the estimated variance of this mean.
     fn new(lights: [[f64; 3]; 2], rays: [u32; 2]) -> Self {
         let [first, second] = lights;
         let share = f64::from(rays[0]) / f64::from(rays[0] + rays[1]);
@@ -207,8 +207,8 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileDevia
     error
 }
 
-/// Returns `settings` with other values where these do not change indirect light: tiles of 16x16 pixels,
-/// sorted gathers with the chip's own queue, and no shadow rays.
+/// Returns `settings` with fixed values of everything that does not change indirect light: tiles of 16x16
+/// pixels, sorted gathers with the chip's own queue, and no shadow rays.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {
         schedule: Schedule {

@@ -2,8 +2,8 @@
 //!
 //! Tiles are sorted along the Z-order curve of their centres and divided into as many strata (*stretches*) as
 //! there are tiles to choose. The sizes of strata differ by at most one tile. A hash chooses one tile of each
-//! stretch, which represents it. The sample is thus spread over the picture whatever the shape of the tiles,
-//! does not alias with regular patterns of the scene, and is reproducible.
+//! stretch, and this tile represents the stretch. Whatever the shape of the tiles, the sample is spread over
+//! the picture, does not alias with regular patterns of the scene, and is reproducible.
 
 use std::fmt;
 use std::str::FromStr;
@@ -57,9 +57,8 @@ impl FromStr for SampleRate {
 /// A tile chosen for a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Chosen {
-    /// The tile.
     pub(crate) tile: Tile,
-    /// Weight of the tile: number of tiles in the stretch that it represents.
+    /// Weight of the tile: number of tiles in its stretch, including itself.
     pub(crate) stands_for: usize,
 }
 
@@ -107,8 +106,8 @@ impl Estimate {
     /// The estimate is the sum of value times weight, `+- t s sqrt(sum w (w - 1))`, where `s` is the standard
     /// deviation of the `n` values and `t` is Student's t for `n - 1` degrees of freedom. With equal weights
     /// this is the interval of a simple random sample of a finite population. A sample that is spread over
-    /// the picture has smaller errors than a random one, so that the interval is rather too wide than too
-    /// narrow. A single value that represents more than itself has an infinite half-width.
+    /// the picture has smaller errors than a random one, so that the interval tends to be too wide. The
+    /// half-width is infinite if the only value has a weight above 1.
     pub(crate) fn of_total(sample: &[(f64, usize)]) -> Self {
         let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
         let spread =
@@ -147,9 +146,9 @@ impl Ratio {
     /// Ratio of an estimate to itself.
     pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
 
-    /// Ratio of two independent estimates. If `n` and `d` are the half-widths of numerator and denominator
-    /// divided by their values, the half-width of the interval of the ratio's logarithm is `sqrt(n^2 + d^2 +
-    /// further^2)`, where `further` is the half-width of a third, independent error of the logarithm.
+    /// Ratio of two independent estimates. If `n` and `d` are the relative half-widths of numerator and
+    /// denominator, the interval is `ratio * exp(+-sqrt(n^2 + d^2 + further^2))`. `further` is the half-width
+    /// of a third, independent error of the ratio's logarithm.
     pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
         let relative = |estimate: Estimate| estimate.half_width / estimate.value;
         let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();

@@ -13,12 +13,12 @@ use photoncard_render::{Integrator, PhotonMaps, Picture, RenderSettings, Samplin
 use super::point::{Point, Task};
 use super::sample::SampleRate;
 
-/// Side of the dissertation's tiles, pixels.
+/// Side of the tiles in Steinhurst's dissertation (2007), pixels.
 pub(super) const TILE: u32 = 16;
-/// Side of the largest square tile for which the reference chip has room, pixels.
+/// Side of the largest square tile that the reference chip can render, pixels.
 pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
-/// Settings that all points of a study have in common, and the number of points.
+/// Settings that all points of a study have in common, and whether studies have many points or few.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {
     /// Width and height of the picture, pixels.
@@ -46,7 +46,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Scale with the dissertation's nominal frame.
+    /// Scale with the nominal frame of Steinhurst's dissertation (2007).
     pub const FULL: Self = Self {
         side: 512,
         photons: 500_000,
@@ -75,15 +75,15 @@ impl Scale {
         machine: Machine::NOMINAL,
     };
 
-    /// Returns whether all points have the settings of the dissertation's nominal frame. Only figures at such
-    /// a scale may be compared with published ones.
+    /// Returns whether all points have the settings of the dissertation's nominal frame. Published figures
+    /// may be compared only with figures at such a scale.
     pub(crate) fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
         frame(self) == frame(&Self::FULL)
     }
 
-    /// Text that marks figures as those of a trial; `None` if the scale is that of the nominal frame.
+    /// Text that marks figures as those of a trial; `None` for the settings of the nominal frame.
     pub fn banner(&self) -> Option<String> {
         let Self { side, photons, neighbors, gather_rays, .. } = self;
         let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
@@ -112,8 +112,8 @@ impl Scale {
         if self.is_quick { quick.to_vec() } else { full.to_vec() }
     }
 
-    /// Settings without any technique except an order: tiles of 16x16 pixels, one in flight, sampling by the
-    /// reflection, Jensen's kd-tree.
+    /// Settings with no technique except the order `order` of gathers: tiles of 16x16 pixels, one tile in
+    /// flight, gather rays sampled by the reflection, and Jensen's kd-tree.
     pub fn settings(&self, order: GatherOrder) -> RenderSettings {
         RenderSettings {
             picture: Picture { width: self.side, height: self.side, ..Picture::default() },
@@ -135,7 +135,7 @@ impl Scale {
     }
 
     /// Settings with all techniques: gathers sorted over the largest tiles, combined sampling, the irradiance
-    /// cache, the line layout.
+    /// cache, the photon map's line layout.
     pub fn all_on(&self) -> RenderSettings {
         self.settings(GatherOrder::Sort).with(|s| {
             s.photons.layout = PhotonLayout::Lines;
@@ -151,20 +151,20 @@ impl Scale {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
-    /// Point that measures the traffic of sampled tiles behind the nominal caches.
+    /// Point that measures the memory traffic of a sample of the tiles, with the nominal caches.
     pub fn traffic(&self, scene: &str, settings: RenderSettings) -> Point {
         self.traffic_behind(scene, settings, CacheSettings::default())
     }
 
-    /// Point that measures the traffic of sampled tiles behind `caches`.
+    /// Point that measures the memory traffic of a sample of the tiles, with `caches`.
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
         let chip = EmulatedKind::Reference;
         let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
-    /// Point that measures the traffic of all tiles on chips of kind `chip` behind `caches`, on a single chip
-    /// if it has several tiles in flight.
+    /// Point that measures the memory traffic of all tiles on chips of kind `chip` with `caches`. If a chip
+    /// has several tiles in flight in a gather queue, one chip renders all tiles.
     pub(super) fn on_one_chip(
         &self,
         scene: &str,
@@ -176,12 +176,12 @@ impl Scale {
         Point { task, ..self.traffic_behind(scene, settings, caches) }
     }
 
-    /// Point that measures the traffic of all tiles behind the nominal caches.
+    /// Point that measures the memory traffic of all tiles, with the nominal caches.
     pub fn whole(&self, scene: &str, settings: RenderSettings) -> Point {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
 
-    /// Point that measures the error of [`Self::quality_tiles`] tiles.
+    /// Point that measures the error of the pixels of [`Self::quality_tiles`] tiles.
     pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
@@ -219,7 +219,8 @@ impl Scale {
     }
 }
 
-/// Name and value that describe the machine of a report's times and numbers of chips, for its provenance.
+/// Row of a report's provenance: name and description of the machine for which times and numbers of chips are
+/// computed.
 pub(super) fn machine_row(machine: &Machine) -> (String, String) {
     let Machine { link, tasks, .. } = machine;
     let value = format!(

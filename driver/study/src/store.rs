@@ -1,8 +1,8 @@
 //! Finished points of a study, stored so that an interrupted study continues where it stopped.
 //!
-//! A point is one JSON file with the settings that determine it (its *key*) and its result. The key includes
-//! everything that the result depends on, also the program's version. A point is only found by an equal key,
-//! so that a new version computes all points again.
+//! A point is one JSON file with its result and its *key*: everything that the result depends on, including
+//! the program's version. A point is found only by an equal key, so that a new version measures all points
+//! again.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -85,8 +85,8 @@ impl PointStore {
 
     /// Returns the result of the point with this name and key, if it is finished.
     ///
-    /// A file that cannot be read, is damaged or edited, or has another key counts as missing and adds to the
-    /// [notices](Self::notices).
+    /// A file that cannot be read, is damaged or edited, or has another key counts as missing, and adds a
+    /// sentence to the [notices](Self::notices).
     pub(crate) fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
         let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {

@@ -1,5 +1,5 @@
-//! Does all gathers of a frame along one Hilbert curve, the bound with which the orders of a chip are
-//! compared.
+//! Performs all gathers (photon searches) of a frame in the order of their positions along one Hilbert curve.
+//! The memory traffic in this order is the bound with which the orders of chips are compared.
 //!
 //! No chip can do this, because the gathers of a frame take gigabytes. Emulated chips pass their gathers to
 //! the host, which sorts them, and does them when all rays are cast (Steinhurst, Coombe, Lastra 2005).
@@ -27,7 +27,8 @@ use rayon::prelude::*;
 
 /// Maximum number of gathers kept at once. With 32 bytes each they take 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
-/// Approximate number of gathers in one round of casting. The host takes them over after the round.
+/// Approximate number of gathers for which rays are cast in one round. The host collects the gathers after
+/// the round.
 const GATHERS_PER_CAST: u64 = 1 << 21;
 /// Number of gathers per task. It is large, so that the empty caches at a task's beginning hardly matter.
 const GATHERS_PER_TASK: usize = 1 << 22;
@@ -67,7 +68,7 @@ impl GatherOutlet for Outlet {
     }
 }
 
-/// A frame to be rendered along the curve.
+/// A frame whose gathers are to be performed along one Hilbert curve, and the means to render it.
 #[derive(Clone, Copy)]
 pub struct WholeFrame<'a> {
     /// The card image.
@@ -86,9 +87,9 @@ pub struct WholeFrame<'a> {
 
 /// Picture, work and memory traffic of a frame.
 pub struct FrameOutcome {
-    /// Tiles of the picture, equal to those of any other order.
+    /// Tiles of the picture. Their pixels are the same in every order of gathers.
     pub tiles: Vec<FinishedTile>,
-    /// Counters of the work.
+    /// Counts of the chips' work, such as rays and gathers.
     pub counters: Counters,
     /// Memory traffic.
     pub traffic: MemoryTraffic,
@@ -172,7 +173,7 @@ impl WholeFrame<'_> {
     }
 }
 
-/// Number of gather rays per pixel. It is an estimate with the irradiance cache and with adaptive sampling.
+/// Number of gather rays per pixel. With the irradiance cache or adaptive sampling the number is an estimate.
 fn rays_of_pixel(frame: &FrameParameters) -> u64 {
     let samples = frame.samples as u64;
     match frame.irradiance_error {

@@ -27,7 +27,7 @@ impl Work {
     pub(crate) const ALL: [Self; 3] = [Self::Eye, Self::Rays, Self::Gathers];
 }
 
-/// Side of the tile, which lies in the middle of the picture, pixels.
+/// Side of the rendered tile, pixels. The tile lies in the middle of the picture.
 const TILE_SIDE: u32 = 16;
 
 /// Receiver of gathers that drops them.

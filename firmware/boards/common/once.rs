@@ -1,4 +1,4 @@
-//! Statics whose value one owner may take as a mutable reference.
+//! Statics whose value can be taken once, as a mutable reference.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};

@@ -17,8 +17,9 @@ static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
 /// On-chip memory of the port, bytes.
 pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
 
-/// Handles the UART's interrupt: moves received bytes into the ring until the ring is full. Further bytes
-/// stay in the UART, whose interrupt is disabled until [`BoardPort`] has read.
+/// Handles the UART's interrupt: moves received bytes into the ring until the ring is full. When the ring is
+/// full, further bytes stay in the UART, and its interrupt is disabled until [`BoardPort`] has read from the
+/// ring.
 pub(crate) fn receive_all<B: Board>() {
     while !RECEIVED.is_full() {
         let Some(byte) = B::receive() else { return };

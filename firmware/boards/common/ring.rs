@@ -1,4 +1,4 @@
-//! Lock-free ring buffer of bytes, with one producer, an interrupt handler, and one consumer, the program.
+//! Lock-free ring buffer of bytes with one producer (an interrupt handler) and one consumer (the program).
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 

@@ -1,4 +1,5 @@
-//! Loads a card image: lines in any order, then the checksum of all lines, then the header.
+//! Loading of a card image. The lines arrive in any order; then the checksum of all lines and the header are
+//! checked.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::checksum::{ImageChecksum, image_checksum};
@@ -63,7 +64,8 @@ impl Loader {
     /// Writes lines from line `first` on. Returns the index past the last line.
     ///
     /// # Errors
-    /// [`FaultCode::Lines`] if `data` is not whole lines of the card image. Nothing is written then.
+    /// [`FaultCode::Lines`] if `data` does not consist of whole lines, or exceeds the card image. Nothing is
+    /// written then.
     pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
         let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
@@ -79,7 +81,7 @@ impl Loader {
     }
 }
 
-/// Check of a loaded card image against the announced checksum, chunk by chunk.
+/// Check of a loaded card image against the announced checksum, in chunks of `CHUNK_LINES` lines.
 pub(super) struct Check {
     loader: Loader,
     next: u32,
@@ -87,7 +89,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// Adds the next chunk to the checksum. Returns the scene after the last chunk, `None` before.
+    /// Adds the next chunk to the checksum. Returns the scene when the check is complete, `None` before.
     ///
     /// # Errors
     /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the card image is not the announced one.
@@ -126,7 +128,7 @@ impl Check {
 /// Maximum length of the checksums in one reply, bytes.
 pub(super) const CHECKSUMS_BYTES: usize = 8 * CHECKSUMS_PER_REPLY as usize;
 
-/// Computation of the checksums that the host requested, one chunk a step.
+/// Computation of the checksums that the host requested, one for each chunk of `CHUNK_LINES` lines.
 pub(super) struct Checksums {
     pub(super) first: u32,
     end: u32,

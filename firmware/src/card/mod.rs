@@ -1,9 +1,9 @@
 //! A card executes commands and sends replies. It is a state machine without I/O that consumes and produces
 //! bytes.
 //!
-//! Its caller ([`crate::serve`], or a simulator) calls [`Card::feed`] with received bytes, sends the bytes of
-//! [`Card::outgoing`], calls [`Card::work`] while [`Card::is_busy`] (and may at any time), and
-//! [`Card::acknowledge`] when the line is quiet. A call takes at most the time of some rays or gathers, or of
+//! Its caller ([`crate::serve`] or a simulator) passes received bytes to [`Card::feed`] and sends the bytes
+//! of [`Card::outgoing`]. It calls [`Card::work`] at least while [`Card::is_busy`] returns true, and
+//! [`Card::acknowledge`] when no bytes arrive. A call takes at most the time of some rays or gathers, or of
 //! the checksum of a few lines. No call blocks or panics, whatever the input.
 
 mod engine;
@@ -21,7 +21,7 @@ use crate::chip::Chip;
 use crate::kind::{ChipKind, FixedKind, Micro, Reference, cache_bytes};
 use crate::memory::{CardMemory, Dram};
 
-/// A card with one chip: its memory, the chip, and both directions of its link.
+/// A card: its memory, its chip, and both directions of its link to the host.
 pub struct Card<K: ChipKind, M> {
     memory: M,
     transport: Transport,
@@ -29,7 +29,7 @@ pub struct Card<K: ChipKind, M> {
 }
 
 impl<K: FixedKind, M: CardMemory> Card<K, M> {
-    /// Creates a card that has had no session.
+    /// Creates a card, before its first session.
     pub const fn new(memory: M) -> Self {
         const { check::<K>() };
         Self::with_chip(Chip::new(), memory)
@@ -37,7 +37,7 @@ impl<K: FixedKind, M: CardMemory> Card<K, M> {
 }
 
 impl<K: ChipKind, M: CardMemory> Card<K, M> {
-    /// Creates a card of a chip. It has had no session.
+    /// Creates a card with the given chip, before its first session.
     pub const fn with_chip(chip: Chip<K>, memory: M) -> Self {
         Self { memory, transport: Transport::card(), engine: Engine::new(chip) }
     }
@@ -53,12 +53,12 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
         self.engine.measure = Some(measure);
     }
 
-    /// Returns true while there is work that needs no further byte from the host.
+    /// Returns true while [`Self::work`] can proceed without further bytes from the host.
     pub fn is_busy(&self) -> bool {
         self.engine.has_work() && self.transport.can_send()
     }
 
-    /// Bytes to be sent now.
+    /// Bytes to be sent to the host now.
     pub fn outgoing(&mut self) -> &[u8] {
         self.transport.outgoing()
     }
@@ -95,7 +95,7 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
         }
     }
 
-    /// Acknowledges received frames. To be called when the line is quiet, before a wait.
+    /// Acknowledges received frames. To be called when no more bytes arrive, before the caller waits.
     pub fn acknowledge(&mut self) {
         self.transport.acknowledge();
     }
@@ -116,7 +116,7 @@ pub type ReferenceCard<M> = Card<Reference, M>;
 /// Card with a micro chip.
 pub type MicroCard<M> = Card<Micro, M>;
 
-/// On-chip memory of a card, bytes: its buffers, and caches and stack of the budget.
+/// On-chip memory of a card of kind `K`, bytes: its buffers, plus the caches and the stack of the budget.
 pub const fn sram_bytes<K: FixedKind>() -> usize {
     size_of::<Card<K, Dram<'static>>>() + cache_bytes(&K::BUDGET) + K::BUDGET.stack_bytes as usize
 }

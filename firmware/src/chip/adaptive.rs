@@ -6,9 +6,9 @@
 //! k = s / (t sqrt(L)), rounded, 1 to 16
 //! ```
 //!
-//! where `L` is the mean of the probes' light over samples and channels, `s^2` is its variance over samples,
-//! averaged over channels, and `t` is the frame's threshold. `k` is proportional to `s`, and to the
-//! visibility of noise under a tone curve, which is about `1 / sqrt(L)`.
+//! where `L` is the mean of the probes' light over samples and channels, `s^2` is the variance of that light
+//! over samples, averaged over channels, and `t` is the frame's threshold. `k` is proportional to `s`, and to
+//! the visibility of noise under a tone curve, which is about `1 / sqrt(L)`.
 //!
 //! An estimate whose number of samples depends on these samples is biased (Kirk, Arvo 1991, *Unbiased
 //! sampling techniques for image synthesis*). Probes therefore have a fixed weight, half of a sample's, and
@@ -16,9 +16,9 @@
 //! ([`PixelSample::stratified`](crate::render::PixelSample::stratified)): the expectation of later paths
 //! depends neither on `k` nor on the probes.
 //!
-//! A picture may be divided into frames by samples, with adaptive sampling or without: a path is a function
-//! of pixel, sample and `k`, and `k` is a function of the pixel's probes. A frame of later samples traces the
-//! probes again.
+//! The samples of a picture can be divided among several frames, with or without adaptive sampling: a path is
+//! a function of pixel, sample and `k`, and `k` is a function of the pixel's probes. A frame of later samples
+//! traces the probes again.
 
 use glam::Vec3;
 use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
@@ -40,7 +40,7 @@ impl Paths {
         if sample < PROBES { 1 } else { self.0.into() }
     }
 
-    /// Index, among all paths of the pixel, of path `path` of sample `sample`.
+    /// Index of path `path` of sample `sample` among all paths of the pixel.
     pub(super) fn index(self, sample: u32, path: u32) -> u32 {
         let later = sample.saturating_sub(PROBES).wrapping_mul(self.0.into());
         sample.min(PROBES).wrapping_add(later).wrapping_add(path)
@@ -56,7 +56,7 @@ impl Paths {
     }
 }
 
-/// Sums over a pixel's probes, by channel: of the light, W/(sr m^2), and of the squared light.
+/// Sums of the light, W/(sr m^2), and of the squared light of a pixel's probes, for each channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probes {
     sum: Vec3,
@@ -72,8 +72,9 @@ impl Probes {
         self.squares += light * light;
     }
 
-    /// Number of paths per sample, `s / (threshold sqrt(L))` rounded to 1 to 16, after all probes are added:
-    /// `L` is the mean of their light, `s` its standard deviation, the threshold in W^(1/2)/(sr^(1/2) m).
+    /// Number of paths per sample after the probes: `s / (threshold sqrt(L))`, rounded and limited to 1 to
+    /// 16. `L` is the mean of the light of all probes, `s` its standard deviation. The threshold is in
+    /// W^(1/2)/(sr^(1/2) m).
     pub(super) fn paths(&self, threshold: f32) -> Paths {
         let probes = PROBES as f32;
         let mean = self.sum.element_sum() / (3.0 * probes);
@@ -135,7 +136,7 @@ mod tests {
     }
 
     /// If probes and later samples shared one stratified pattern, later points would lie in the strata that
-    /// the probes left free: an edge at an eighth of the pixel would be a third too bright.
+    /// the probes left free: a pixel that is lit up to an eighth of its width would be a third too bright.
     #[test]
     fn the_choice_of_the_number_of_paths_has_no_bias() {
         const PIXELS: u32 = 20_000;

@@ -10,7 +10,7 @@ use crate::kind::ChipKind;
 
 /// Gather points, pixel sums, gathers and kept irradiance records of a chip.
 pub(super) struct Shared<K: ChipKind> {
-    /// Gather points of the active tile.
+    /// Gather points of the tile whose rays are being cast.
     pub(super) points: Points<K::Points>,
     pub(super) sums: PixelSums<K::TilePixels>,
     pub(super) gathers: Gathers<K::Candidates, K::GatherQueue>,

@@ -1,13 +1,13 @@
-//! Completion of a pixel: adds the light that needs no gather rays, albedo, normal and depth.
+//! Completion of a pixel: adds its albedo, normal and depth, and the light that needs no gather rays.
 //!
 //! Pixels without gather rays are completed first, as soon as the irradiance records of their block are
 //! gathered. Each of their paths is traced once. The same pass finds the pixels with gather rays. These are
 //! completed when no gather of the block waits; each of their paths is then traced again, because a chip has
 //! no memory to keep paths.
 //!
-//! Probes ([`super::adaptive`]) are traced here as well. For a pixel without gather rays they are its first
-//! samples, or precede the samples of a frame that begins later. Other pixels have a separate pass for their
-//! probes.
+//! Probes ([`super::adaptive`]) are traced here as well. For a pixel without gather rays, they are the first
+//! samples of its completion. They are also traced if the frame begins with a later sample. Pixels with
+//! gather rays have a separate pass for their probes.
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, FrameParameters, PROBES};
@@ -48,8 +48,8 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Completes the next path of a pixel. Returns the pixel after its last path. A pixel that turns out to
-    /// have gather rays is left for a later pass.
+    /// Completes the next path of a pixel. Returns the finished pixel if that path was its last. A pixel that
+    /// turns out to have gather rays is left for a later pass.
     ///
     /// # Errors
     /// If the card image is invalid.
@@ -125,7 +125,8 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Traces the current path of a completion. Returns whether the path has gather rays.
+    /// Traces the current path of the pixel that is being completed, and adds its light. Returns whether the
+    /// path has gather rays.
     fn look_at<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -187,9 +188,9 @@ impl Completion {
     }
 }
 
-/// Adds the light of a path in a sample of `paths` paths: emission and interpolated irradiance; and, for a
-/// probe or a path without gather rays, the light of shadow rays and caustics. Returns whether the path has
-/// gather rays.
+/// Adds emission and interpolated irradiance of a path whose sample has `paths` paths. For a probe, or a path
+/// without gather rays, also adds the light of shadow rays and caustics. Returns whether the path has gather
+/// rays.
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
@@ -226,8 +227,8 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         point.directions = DirectionTable::of_reflection(&point.reflector());
     }
     context.memory.enter(Stage::Shadow);
-    // The last bits of a surface's values depend on how the surface is read. It is read here as in
-    // [`Pass::Direct`].
+    // The surface is read as in [`Pass::Direct`], because the last bits of its values depend on the way in
+    // which it is read.
     if let Some(seen) = &view.seen {
         eye::surface(context, view.film, seen, &mut point.surface)?;
     }

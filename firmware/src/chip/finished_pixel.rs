@@ -11,7 +11,7 @@ use super::light::PixelLight;
 use crate::fixed_point::ColourSum;
 use crate::render::features::Features;
 
-/// A complete pixel.
+/// A complete pixel: its tile, its index in the tile, and its sums over all samples.
 #[derive(Clone, Copy, Debug)]
 pub struct FinishedPixel {
     /// [`Tile::id`](photoncard_shared::message::Tile::id) of the pixel's tile.
@@ -43,8 +43,8 @@ impl PixelView {
         let Self(sums) = self;
         let albedo = features.albedo.clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
         let normal = features.normal * NORMAL_STEPS as f32;
-        // Conversions round towards zero and saturate. No number of samples in a budget overflows the sums of
-        // albedo and normal.
+        // Conversions round towards zero and saturate. The maximum number of samples does not overflow the
+        // sums of albedo and normal.
         for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
             let (Some(albedo_sum), Some(normal_sum)) = (sums.albedo.get_mut(axis), sums.normal.get_mut(axis))
             else {
@@ -58,8 +58,8 @@ impl PixelView {
         sums.surfaces = sums.surfaces.saturating_add(1);
     }
 
-    /// Combines albedo, normal and depth with sums of light. `light` has one sum or, with layers, one per
-    /// component and the count of gathers.
+    /// Combines albedo, normal and depth with sums of light. With layers, `light` is a sum for each
+    /// component, then the count of gathers. Without layers it is a single sum.
     pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
         match light {
             [direct, indirect, caustic, gathers] => {
@@ -82,11 +82,10 @@ pub(super) struct Completion {
     pub(super) path: u32,
     /// Light of the current path, in the card image's radiance units.
     pub(super) of_path: Vec3,
-    /// Sums of the probes' light.
     pub(super) probes: Probes,
-    /// Number of paths, in a frame with gather rays, that see a surface with a Lambertian part.
+    /// Number of paths that see a surface with a Lambertian part; 0 in a frame without gather rays.
     pub(super) lambertian: u32,
-    /// Number of paths whose irradiance is interpolated.
+    /// Number of paths whose irradiance is interpolated from irradiance records.
     pub(super) interpolated: u32,
 }
 

@@ -16,7 +16,7 @@ use crate::render::PixelSample;
 /// Capacity of the stack of blocks, sufficient for all halvings of a tile.
 const MAX_BLOCKS: usize = 32;
 
-/// Value in [`Flight::sums`] of a pixel that is not known to have gather rays.
+/// Value in [`Flight::sums`] of a pixel for which no gather rays were found so far.
 const PLAIN: u16 = u16::MAX;
 /// Value in [`Flight::sums`] of a pixel that has gather rays, but no sum yet.
 const UNSUMMED: u16 = PLAIN - 1;
@@ -33,8 +33,8 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// For each pixel of the block, its number among the tile's pixels in [`super::pixel_sums::PixelSums`];
-    /// or [`PLAIN`], or [`UNSUMMED`].
+    /// Number of each pixel of the block among the tile's pixels in [`super::pixel_sums::PixelSums`], or
+    /// [`PLAIN`] or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
     /// Number of paths per sample, by pixel of the block.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
@@ -96,7 +96,6 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Begins the next block.
     pub(super) fn begin_block(&mut self, frame: &FrameParameters) -> Result<(), Fault> {
         self.block = self.blocks.pop().ok_or(Invariant::Block.fault())?;
         self.set_all_sums(PLAIN)?;
@@ -128,7 +127,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Goes on without irradiance records: gives all pixels of the block gather rays.
+    /// Skips the irradiance records of the block: all its pixels get gather rays.
     pub(super) fn do_without_records(&mut self) -> Result<(), Fault> {
         self.cache.forget();
         self.set_all_sums(UNSUMMED)?;
@@ -177,7 +176,7 @@ impl<K: ChipKind> Flight<K> {
         self.position = Position::at(if adaptive::needs_probes(frame) { Pass::Probe } else { Pass::Eye });
     }
 
-    /// Row-major index in the tile of the block's pixel `index`.
+    /// Row-major index of the block's pixel `index` in the tile.
     pub(super) fn index_in_tile(&self, index: u32) -> u32 {
         let [column, row] = self.block.pixel(index);
         row * self.tile.width + column

@@ -77,8 +77,8 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.push(request).is_ok()
     }
 
-    /// Begins a drain. Returns the number of waiting gathers, and the first gather of the drain; `None` if no
-    /// gather waits.
+    /// Begins to drain the queue in the order `drain`. Returns the number of waiting gathers and the first
+    /// gather; `None` if no gather waits.
     pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
         if self.queue.is_empty() {
             return None;
@@ -87,7 +87,7 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.first().map(|first| (self.queue.len(), first))
     }
 
-    /// Takes the next gather of the drain; `None` ends the drain.
+    /// Takes the next gather of the drain; `None` after the last one, which ends the drain.
     pub(super) fn take(&mut self) -> Option<GatherRequest> {
         self.queue.take()
     }

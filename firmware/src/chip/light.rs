@@ -1,7 +1,8 @@
 //! Components of a pixel's light, and their sums. A pixel has one sum or, with layers, one per component.
 //!
-//! Fixed-point sums are exact, so that layers do not change a bit of a pixel's radiance, which is the sum of
-//! the components. With layers a pixel has [`SUMS_WITH_LAYERS`] sums, the last of which counts gathers.
+//! A pixel's radiance is the sum of its components. Fixed-point sums are exact, so that this radiance has the
+//! same bits with and without layers. With layers a pixel has [`SUMS_WITH_LAYERS`] sums, the last of which
+//! counts gathers.
 
 use glam::Vec3;
 use photoncard_shared::budget::{SUMS_WITH_LAYERS, sums_of_pixel};
@@ -23,8 +24,8 @@ pub enum Component {
 }
 
 impl Component {
-    /// Index of this component of pixel number `pixel` in an array of the sums of consecutive pixels. Without
-    /// layers, all components of a pixel have one sum.
+    /// Index of this component's sum for pixel number `pixel`, in an array of the sums of consecutive pixels.
+    /// Without layers, all components of a pixel share one sum.
     #[inline(always)]
     pub fn sum_of(self, frame: &FrameParameters, pixel: usize) -> usize {
         if frame.layers { pixel * SUMS_WITH_LAYERS as usize + self as usize } else { pixel }

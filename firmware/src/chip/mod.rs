@@ -1,8 +1,8 @@
 //! One chip: its tiles in flight, and their passes.
 //!
-//! A tile goes through the passes that the module `position` lists, block by block. A pass is done for all
-//! gather points that the chip stores before the next pass begins, so that gathers of neighbouring points
-//! follow one another.
+//! A tile goes through the passes that the module `position` lists, block by block. Each pass handles all
+//! stored gather points before the next pass begins. Gathers of neighbouring points therefore follow one
+//! another.
 //!
 //! When all rays of a block's irradiance records, or of its pixels, are cast, their gathers wait in the queue
 //! with those of other tiles, and another tile proceeds. The queue is drained when it is full or nothing else
@@ -10,7 +10,7 @@
 //! gathered, the others when no gather of the block waits. Each call of [`Chip::step`] does a small piece of
 //! this work.
 //!
-//! | state | kept from the command to the last pixel, of each tile in flight |
+//! | state | data of a tile in flight, kept from its command to its last pixel |
 //! |---|---|
 //! | `Flight` | tile, counters, progress, irradiance records |
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
@@ -86,7 +86,8 @@ pub enum Progress {
     Pixel(FinishedPixel),
     /// A tile is complete, after its last pixel: [`Tile::id`], and the counters of the work on the tile.
     Tile(u32, Counters),
-    /// There is nothing to do before the next [`Chip::begin`], for which there is room, or [`Chip::flush`].
+    /// There is nothing to do until [`Chip::begin`] or [`Chip::flush`] is called. There is room for another
+    /// tile.
     Idle,
 }
 
@@ -116,8 +117,8 @@ impl<K: ChipKind> Chip<K> {
         Self { kind, flights: Array::VACANT, active: None, shared: Shared::new() }
     }
 
-    /// Creates a chip without tiles whose capacities are values instead of types: those of the kind's budget,
-    /// and `points` gather points whose rays are cast together.
+    /// Creates a chip without tiles, with capacities set at run time instead of by types. They are those of
+    /// the kind's budget, and `points` for the gather points whose rays are cast together.
     pub fn sized(kind: K, points: usize) -> Self {
         let budget = *kind.budget();
         let mut chip = Self::vacant_of(kind);
@@ -150,8 +151,8 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Begins a frame. Irradiance records may be kept in `room`, a range of line addresses of card memory
-    /// past the card image. Without this call no records are kept.
+    /// Begins a frame. If `frame` asks for it, irradiance records are kept in `room`, a range of line
+    /// addresses of card memory past the card image. Without this call no records are kept.
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         self.shared.store.begin_frame(frame, room);
     }
@@ -190,7 +191,8 @@ impl<K: ChipKind> Chip<K> {
         self.flights.values().iter().position(holds)
     }
 
-    /// Begins a drain of the gather queue, because no tile follows. Returns false if no gather waits.
+    /// Begins to drain the gather queue although it is not full, because no tile follows. Returns false if no
+    /// gather waits.
     pub fn flush(&mut self, frame: &FrameParameters) -> bool {
         let waits = !self.shared.gathers.is_empty();
         if waits && !self.shared.gathers.is_draining() {
@@ -199,8 +201,8 @@ impl<K: ChipKind> Chip<K> {
         waits
     }
 
-    /// Does the next pieces of work, about 16 rays and gathers. A card polls its link after each step: steps
-    /// are short, for a prompt reply, but long enough that the cost of polling is negligible.
+    /// Does the next pieces of work, about 16 rays and gathers in all. A card polls its link after each step.
+    /// Steps are short enough for a prompt reply, and long enough to make the cost of polling negligible.
     ///
     /// # Errors
     /// If the card image is invalid, or an [`Invariant`] is violated. The caller should then drop all tiles
@@ -257,9 +259,9 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins, for a tile in flight, the passes of a block's pixels with gather rays or, if no tile waits for
-    /// these, the next block. If no tile waits for either, begins a drain if there is no room for another
-    /// tile; otherwise the chip is idle.
+    /// Chooses the next tile in flight to work on: one whose block has pixels with gather rays left, else one
+    /// whose next block has not begun. Without either, begins a drain if there is no room for another tile;
+    /// otherwise the chip is idle.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {
@@ -277,8 +279,9 @@ impl<K: ChipKind> Chip<K> {
         Ok(if must_drain { Progress::Busy } else { Progress::Idle })
     }
 
-    /// Completes the next path of a pixel in a block of which no gather waits. After the block's last pixel,
-    /// the tile goes on with the block's pixels with gather rays or with the next block, or it ends.
+    /// Completes the next path of a pixel of tile in flight `number`, whose block has no waiting gathers.
+    /// After the last pixel of the pass, the tile proceeds to the block's pixels with gather rays or to the
+    /// next block, or it ends.
     fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -315,7 +318,7 @@ impl<K: ChipKind> Chip<K> {
         Ok(finished.map_or(Progress::Busy, Progress::Pixel))
     }
 
-    /// Begins a drain of the gather queue. The tile whose gather is first in the drain counts it.
+    /// Begins to drain the gather queue. The drain is counted for the tile of the first gather.
     fn begin_drain(&mut self, frame: &FrameParameters) {
         // An empty queue has nothing to drain.
         let Some((waiting, first)) = self.shared.gathers.begin_drain(frame.drain) else { return };

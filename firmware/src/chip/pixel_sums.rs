@@ -1,8 +1,8 @@
 //! Sums of light of the pixels with gather rays, for all tiles in flight.
 //!
 //! Only pixels with gather rays receive light before they are completed: from gather rays, shadow rays and
-//! caustics. The sums are in a ring buffer. The sums of a block's pixels are consecutive there: a run, which
-//! grows while the block's eye rays are cast and ends when the block's pixels are complete.
+//! caustics. The sums are in a ring buffer. The sums of a block's pixels are consecutive and form a *run*. A
+//! run grows while the block's eye rays are cast, and ends when the block's pixels are complete.
 
 use core::num::NonZeroU32;
 
@@ -18,7 +18,7 @@ use crate::kind::{Buffer, Capacity};
 pub(super) struct PixelSums<C: Capacity> {
     sums: C::Buffer<ColourSum>,
     runs: [Run; MAX_IN_FLIGHT as usize],
-    /// Position in the ring, in pixels, of the next pixel.
+    /// Position in the ring at which the next pixel is appended, in pixels.
     end: u32,
 }
 
@@ -48,12 +48,12 @@ impl<C: Capacity> PixelSums<C> {
         self.sums.reserve(sums);
     }
 
-    /// Number of pixels for which the ring has sums, at least 1.
+    /// Capacity of the ring in pixels, at least 1.
     fn places(&self, frame: &FrameParameters) -> NonZeroU32 {
         NonZeroU32::new(self.sums.capacity() as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
     }
 
-    /// Begins an empty run for tile in flight `flight`, after all other runs.
+    /// Begins an empty run, after all other runs, for the tile in flight with index `flight`.
     pub(super) fn begin(&mut self, flight: usize) {
         // Always fits: the buffer's own capacity.
         let _ = self.sums.resize(self.sums.capacity(), ColourSum::ZERO);
@@ -66,7 +66,7 @@ impl<C: Capacity> PixelSums<C> {
         }
     }
 
-    /// Ends the run of tile in flight `flight`, whose sums were read.
+    /// Frees the run of the tile in flight with index `flight`, after its sums were read.
     pub(super) fn end(&mut self, flight: usize) {
         if let Some(run) = self.runs.get_mut(flight) {
             *run = Run::EMPTY;
@@ -79,8 +79,8 @@ impl<C: Capacity> PixelSums<C> {
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run of tile in flight `flight`, which must be the run that was
-    /// begun last. Returns the pixel's number in the run. [`Self::has_room`] must be true.
+    /// Appends a pixel without light to the run of the tile in flight with index `flight`. This run must be
+    /// the last one begun, and [`Self::has_room`] must be true. Returns the pixel's number in the run.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let (count, places) = (sums_of_pixel(frame.layers) as usize, self.places(frame));
         let first = self.end as usize * count;

@@ -1,5 +1,5 @@
 //! Passes of a block's pixels with gather rays, stripe by stripe and sample by sample. They cast the gather
-//! rays and compute direct light, which is weighted against these rays.
+//! rays and compute direct light, which is weighted against these rays by the balance heuristic.
 
 use core::ops::Range;
 
@@ -20,7 +20,8 @@ use crate::render::{
 };
 use crate::scene::Seen;
 
-/// Gather point of a path in a sample of `paths` paths. Its directions are not chosen yet.
+/// Gather point at the end of an eye path whose sample has `paths` paths. Its direction table is not chosen
+/// yet.
 pub(super) fn pixel_point(
     frame: &FrameParameters,
     at: PixelSample,
@@ -29,13 +30,12 @@ pub(super) fn pixel_point(
     paths: u32,
 ) -> GatherPoint {
     let pattern = pattern(frame, at);
-    // The frame's number of gather rays is, with the irradiance cache, that of a whole pixel; without it,
-    // that of a sample.
+    // The frame's number of gather rays is per pixel with the irradiance cache, and per sample without it.
     let is_of_pixel = allowed_error(frame).is_some();
     let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
-    // The paths of a Lambertian surface share the gather rays of a sample. On other surfaces each path has
-    // all of them: paths are added for noise of direct light and highlights, and gather rays bring highlights
-    // too.
+    // The paths of a Lambertian surface share the gather rays of a sample. On other surfaces each path casts
+    // as many rays as a sample: paths are added to reduce noise of direct light and highlights, and gather
+    // rays find highlights too.
     let sharing = if view.surface.reflection.is_lambertian() { paths.max(1) } else { 1 };
     let rays = frame.gather_rays.div_ceil(samples).div_ceil(sharing);
     if purpose == Purpose::Lobe {
@@ -45,7 +45,7 @@ pub(super) fn pixel_point(
     }
 }
 
-/// Error bound of a sample's interpolated irradiance; `None` if no irradiance records may light the sample.
+/// Error bound of a sample's interpolated irradiance; `None` if irradiance records must not light the sample.
 pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f32> {
     // Records lie where eye rays meet surfaces, not behind mirrors and glass.
     allowed_error(frame).filter(|_| view.is_first && view.surface.reflection.has_lambertian())
@@ -56,8 +56,8 @@ pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
     SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
-/// Gather point of a path in a sample of `paths` paths: for the lobe alone if irradiance records cover the
-/// sample, which geometry decides. Its directions are not chosen yet.
+/// Gather point at the end of an eye path whose sample has `paths` paths. It is for the lobe alone if
+/// irradiance records cover the sample, as geometry decides. Its direction table is not chosen yet.
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
@@ -72,8 +72,8 @@ fn gather_point<M, R: Capacity>(
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Number of pixels of the stripe, the pixels whose gather points are stored together: at most `points`,
-    /// the number of gather points that can be stored.
+    /// Number of pixels of the current stripe, that is, of pixels whose gather points are stored together. It
+    /// is at most `points`, the number of gather points that can be stored.
     fn stripe(&self, points: u32) -> u32 {
         self.block.pixels().saturating_sub(self.position.first).min(points)
     }
@@ -84,8 +84,8 @@ impl<K: ChipKind> Flight<K> {
         shared.sums.has_room(frame) || next().is_none_or(|pixel| self.sum(pixel).is_some())
     }
 
-    /// Index in the block of the next of the stripe's `stripe` pixels that has gather rays and, in the
-    /// current sample, a path with the current number; `None` after the last.
+    /// Index in the block of the stripe's next pixel that has gather rays and whose current sample has a path
+    /// with the current number; `None` after the last. The stripe has `stripe` pixels.
     fn next_pixel(&self, frame: &FrameParameters, stripe: u32) -> Option<u32> {
         let first = self.position.first;
         self.first_with_path(frame, first + self.position.index..first + stripe)
@@ -117,8 +117,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Index of the first pixel among `pixels` of the block that has gather rays and, in the current sample,
-    /// a path with the current number; `None` if there is none.
+    /// Index in the block of the first of `pixels` that has gather rays and whose current sample has a path
+    /// with the current number; `None` if there is none.
     fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
         let Range { mut start, end } = pixels;
         let sample = self.position.sample_of(frame);
@@ -250,8 +250,8 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Light of shadow rays and caustics that one path's gather point reflects, in the card image's radiance
-/// units.
+/// Light that the gather point of a path reflects: direct light found by shadow rays, and caustics. In the
+/// card image's radiance units.
 pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,
@@ -263,7 +263,7 @@ pub(super) fn direct_light<M: MemoryPort>(
     Ok([(Component::Direct, direct), (Component::Caustic, caustic)])
 }
 
-/// Factor from radiance, W/(sr m^2), to the radiance units of a pixel's sum.
+/// Factor that converts radiance, W/(sr m^2), to the radiance units of pixel sums.
 #[inline(always)]
 pub(super) fn per_unit<M>(context: &Context<M>) -> f32 {
     1.0 / context.scene.header.radiance_unit

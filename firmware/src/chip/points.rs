@@ -14,8 +14,8 @@ use crate::sampler::Pattern;
 pub(super) struct Points<C: Capacity> {
     points: C::Buffer<StoredPoint>,
     owners: C::Buffer<u16>,
-    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. The bins are in an
-    /// array of their own, because most points have no ray in the current bin and are passed over.
+    /// Direction bin of each point's next ray, or of its last ray when all are cast. The bins have an array
+    /// of their own, so that a search skips the many points without a ray in the current bin.
     bins: C::Buffer<u8>,
 }
 
@@ -63,8 +63,8 @@ impl<C: Capacity> Points<C> {
         point.ok_or(Invariant::Points.fault())
     }
 
-    /// Index and owner of the next point whose next ray is in the current direction bin; `None` if there is
-    /// none.
+    /// Index and owner of the first point, from `position.index` on, whose next ray is in the current
+    /// direction bin; `None` if there is none.
     #[inline(always)]
     pub(super) fn next(&self, position: &Position) -> Option<(u32, u16)> {
         let first = position.index as usize;
@@ -73,8 +73,8 @@ impl<C: Capacity> Points<C> {
         Some((index as u32, *self.owners.values().get(index)?))
     }
 
-    /// Takes the next rays of point `index` in the current one of `bins` direction bins. Advances `position`
-    /// past these rays.
+    /// Takes the next rays of point `index` in the current direction bin, and advances `position` past them.
+    /// There are `bins` bins in all.
     #[inline(always)]
     pub(super) fn take_rays(
         &mut self,

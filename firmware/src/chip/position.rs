@@ -23,7 +23,7 @@ impl Block {
         self.width * self.height
     }
 
-    /// Column and row in the tile of the pixel with row-major index `index` in the block.
+    /// Column and row, in the tile, of the block's pixel with row-major index `index`.
     pub(super) fn pixel(&self, index: u32) -> [u32; 2] {
         let width = self.width.max(1);
         [self.x + index % width, self.y + index / width]
@@ -45,10 +45,10 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. Without the irradiance cache, [`Pass::ReadKept`] to [`Pass::WaitForRecords`]
-/// are skipped; with kept records, all of these but [`Pass::ReadKept`] are. [`Pass::CompletePlain`] is
-/// skipped without the cache if the frame has gather rays. The passes after [`Pass::CompletePlain`] are for
-/// pixels with gather rays only.
+/// Passes of a block, in order. [`Pass::ReadKept`] to [`Pass::WaitForRecords`] are for the irradiance cache;
+/// if kept records are found, [`Pass::ReadKept`] is the only one of these. In a frame with gather rays but no
+/// irradiance cache, [`Pass::CompletePlain`] is skipped. The later passes are only for pixels with gather
+/// rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// There is no tile.
@@ -116,8 +116,8 @@ impl Position {
         self.rays
     }
 
-    /// Advances by `rays` rays of gather point `index` in the current direction bin: to the point's remaining
-    /// rays or, with `are_last`, to the next point.
+    /// Advances past `rays` rays of gather point `index` in the current direction bin. If they are the
+    /// point's last rays in the bin (`are_last`), advances to the next point.
     pub(super) fn pass_rays(&mut self, index: u32, rays: u32, are_last: bool) {
         [self.index, self.rays] = if are_last { [index + 1, 0] } else { [index, self.rays + rays] };
     }

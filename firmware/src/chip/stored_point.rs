@@ -11,16 +11,16 @@ use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
 
-/// Maximum number of gather rays of one point in one piece of work.
+/// Maximum number of gather rays of one point that are cast in one piece of work.
 const RAYS_PER_STEP: u32 = 64;
 
 /// Part of a gather point that is stored from one direction bin to the next, 48 bytes. The remainder is
 /// computed again in each bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if the surface can be read
-    /// again only by tracing the eye path, because the path passes perfectly specular surfaces or chooses a
-    /// material layer at random. Unused for an irradiance record.
+    /// Triangle of a pixel's gather point, and the position on it. [`Seen::ELSEWHERE`] if the eye path must
+    /// be traced again to find the surface: the path passes perfectly specular surfaces or chooses a material
+    /// layer at random. Unused for an irradiance record.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
     /// Number of rays to cast, and their purpose.
@@ -29,7 +29,8 @@ pub(super) struct StoredPoint {
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
-/// Number of a point's rays in 15 bits, and the flag [`Self::OF_LOBE`] of rays for the lobe only.
+/// Number of rays of a gather point in 15 bits, and the flag [`Self::OF_LOBE`], which is set if the rays
+/// sample only the lobe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StoredRays(u16);
 
@@ -55,18 +56,18 @@ impl StoredRays {
 }
 
 impl StoredPoint {
-    /// Stores the gather point of an irradiance record without its surface, which the record has.
+    /// Stores the gather point of an irradiance record without its surface, which is in the record.
     pub(super) fn of_record(point: &GatherPoint) -> Self {
         Self { seen: Seen::NOWHERE, directions: point.directions, rays: StoredRays::new(point) }
     }
 
-    /// Direction bin, out of `bins`, of the first ray.
+    /// Direction bin of the first ray, from 0 to `bins - 1`.
     pub(super) fn first_bin(&self, pattern: Pattern, bins: u32) -> u32 {
         self.directions.bin(pattern, 0, self.rays.number(), bins)
     }
 
     /// Returns the next rays of direction bin `bin`, at least one and at most [`RAYS_PER_STEP`], and the bin
-    /// of the ray after them. `done` rays of the bin were already cast.
+    /// of the ray after them, if any. `done` rays of the bin were already cast.
     #[inline(always)]
     pub(super) fn next_rays(
         &self,

@@ -1,4 +1,5 @@
-//! Violations of a chip's invariants. Each is a numbered fault, so that no light is lost in silence.
+//! Tests that violate a chip's invariants. Each violation must be reported as a fault, so that no light is
+//! lost in silence.
 
 use std::boxed::Box;
 
@@ -35,13 +36,13 @@ fn scene() -> SceneImage {
     SceneImage { header }
 }
 
-/// Does a step of a chip without memory.
+/// Calls `Chip::step` on a chip with an empty card memory.
 fn step(chip: &mut MicroChip, frame: &FrameParameters) -> Result<Progress, Fault> {
     let (scene, memory) = (scene(), &mut Lines(&[]));
     chip.step(&mut RenderJob { scene: &scene, memory, frame, outlet: None })
 }
 
-/// Gather request for tile in flight number `flight`.
+/// Gather request of the tile in flight with index `flight`.
 fn request(flight: usize) -> GatherRequest {
     let surface = Surface::white(Vec3::ZERO, Vec3::Y, 1.0);
     GatherRequest {

@@ -1,9 +1,9 @@
 //! Photon gathers that wait, and the order in which they are done.
 //!
 //! The end of a gather ray becomes a [`GatherRequest`] of 24 bytes: position, partial reflection, target.
-//! Requests may be executed in any order, as sums are in fixed point. In a spatially coherent order, photons
-//! of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005, *Reordering for cache
-//! conscious photon mapping*):
+//! Requests can be executed in any order, because sums are in fixed point. In a spatially coherent order,
+//! photons of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005, *Reordering
+//! for cache conscious photon mapping*):
 //!
 //! - *generative* reordering casts the rays of one bin of directions
 //!   ([`crate::importance::DirectionTable::bin`]) for all pixels of a tile before the rays of the next bin;

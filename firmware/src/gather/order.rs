@@ -5,9 +5,9 @@ use photoncard_shared::message::Drain;
 
 use crate::sampler::hash;
 
-/// Number of upper bits of a grid coordinate: they are the coordinate of a cell of the Hilbert curve.
+/// Number of upper bits of a grid coordinate that select a cell of the Hilbert curve.
 const CURVE_BITS: u32 = 10;
-/// Number of lower bits of a grid coordinate: they are the offset in the cell of the Hilbert curve.
+/// Number of lower bits of a grid coordinate that are the offset within that cell.
 const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
 const REST_MASK: u64 = (1 << REST_BITS) - 1;
 /// Number of bits of each coordinate of a hash cell: 16 cells along each axis of the grid.
@@ -18,7 +18,7 @@ const BUCKETS: u32 = 256;
 /// Number of low bits of a [`HilbertCode`] that hold a ray's length. Three grid coordinates take the others.
 const LENGTH_BITS: u32 = u64::BITS - 3 * GRID_BITS;
 const MAX_LENGTH: u64 = (1 << LENGTH_BITS) - 1;
-/// Length, in cells of the photon grid, as which all shorter rays are coded.
+/// Minimum length of a ray that codes distinguish, in cells of the photon grid. All shorter rays have code 0.
 const LEAST_LENGTH: f32 = 64.0;
 
 /// Position of a gather, rounded to the photon grid: its index along the Hilbert curve through 1024 cells per

@@ -20,7 +20,7 @@ impl<C: Capacity> Default for GatherQueue<C> {
 }
 
 impl<C: Capacity> GatherQueue<C> {
-    /// An empty queue.
+    /// Creates an empty queue.
     pub const fn new() -> Self {
         Self { waiting: Buffer::EMPTY, draining: false }
     }
@@ -64,7 +64,7 @@ impl<C: Capacity> GatherQueue<C> {
         self.waiting.push(request)
     }
 
-    /// Begins a drain by sorting the requests in the order that `drain` names.
+    /// Begins to drain the queue: sorts the requests in the order that `drain` names.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
         self.waiting.values_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
@@ -76,7 +76,7 @@ impl<C: Capacity> GatherQueue<C> {
         self.waiting.values().last()
     }
 
-    /// Takes the next request; `None` ends the drain.
+    /// Takes the next request of the drain; `None` after the last one, which ends the drain.
     pub fn take(&mut self) -> Option<GatherRequest> {
         let next = self.waiting.pop();
         self.draining = next.is_some();

@@ -10,7 +10,7 @@ use crate::scene::PartialReflection;
 pub struct GatherRequest {
     /// Position on the photon grid, and length of the gather ray that ends there.
     pub position: HilbertCode,
-    /// Partial reflection times the gather ray's weight and the photon power unit over the radiance unit.
+    /// Partial reflection, multiplied by the gather ray's weight and by `photon power unit / radiance unit`.
     pub reflection: PartialReflection,
     /// Sum to which the gathered radiance is added.
     pub target: GatherTarget,
@@ -18,8 +18,8 @@ pub struct GatherRequest {
 
 const _: () = assert!(size_of::<GatherRequest>() == 24);
 
-/// Sum to which the radiance of a gather is added, 3 bytes: the tile in flight, the gather point in it, and
-/// the cell of the hemisphere that contains the gather ray.
+/// Identity of the sum to which the radiance of a gather is added, 3 bytes: the tile in flight, the gather
+/// point in it, and the cell of the hemisphere that contains the gather ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherTarget {
     /// Index of the gather point in 15 bits, and the flag [`Self::OF_RECORD`]; little-endian.
@@ -46,7 +46,8 @@ impl GatherTarget {
     /// Flag of an irradiance record.
     const OF_RECORD: u16 = 1 << 15;
 
-    /// Target of the gathers of `point` in tile in flight `flight`, below [`MAX_IN_FLIGHT`]; cell 0.
+    /// Target of the gathers of `point` in the tile in flight with number `flight`, which is below
+    /// [`MAX_IN_FLIGHT`]. The cell is 0.
     pub const fn new(flight: usize, point: PointIndex) -> Self {
         let bits = match point {
             PointIndex::Pixel(index) => index & !Self::OF_RECORD,
@@ -55,7 +56,7 @@ impl GatherTarget {
         Self { point: bits.to_le_bytes(), cell_and_flight: (flight as u8) << CELL_BITS }
     }
 
-    /// Returns the target with `cell`, the hemisphere cell of the gather ray.
+    /// Returns the target with its cell set to `cell`, which contains the gather ray's direction.
     #[inline(always)]
     #[must_use]
     pub const fn in_cell(self, cell: u8) -> Self {
@@ -75,7 +76,7 @@ impl GatherTarget {
         self.cell_and_flight & ((1 << CELL_BITS) - 1)
     }
 
-    /// The gather point.
+    /// Index of the gather point.
     #[inline(always)]
     pub const fn point(self) -> PointIndex {
         let bits = u16::from_le_bytes(self.point);

@@ -1,5 +1,5 @@
-//! The hemisphere above a surface in 4x8 cells of equal projected solid angle. A cosine-weighted direction
-//! lies in each cell with probability 1/32 (Jensen 1995).
+//! The hemisphere above a surface, divided into 4x8 cells of equal projected solid angle. A cosine-weighted
+//! direction lies in each cell with probability 1/32 (Jensen 1995).
 //!
 //! Rows divide the square of the sine of the angle to the normal, columns the azimuth. Cells are numbered in
 //! boustrophedon order, so that consecutive cells are neighbours.
@@ -29,7 +29,7 @@ pub(crate) fn cell_at(row: usize, column: usize) -> usize {
     row * COLUMNS + if row.is_multiple_of(2) { column } else { COLUMNS - 1 - column }
 }
 
-/// Cell that contains a unit vector; `None` at or below the horizon of `normal`.
+/// Number of the cell that contains the unit vector `direction`; `None` at or below the horizon of `normal`.
 #[inline(always)]
 pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     let (tangent, bitangent) = tangents(normal);
@@ -48,8 +48,8 @@ pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     Some(cell_at(row, column) as u8)
 }
 
-/// Direction at a point of a cell, uniform in projected solid angle. Both coordinates are in [0, 1]: `along`
-/// follows the numbering of the cells, `across` goes from the normal to the horizon.
+/// Maps a point of the unit square to a direction in a cell, uniformly in projected solid angle. The
+/// coordinate `along` follows the numbering of the cells, `across` goes from the normal to the horizon.
 #[inline(always)]
 pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) -> Vec3 {
     let [row, column] = row_and_step(cell);

@@ -2,12 +2,12 @@
 //! direction tables that follow from it.
 //!
 //! Photons straight from a light are excluded, because shadow rays account for that light. With k = 100
-//! photons, only a few pass through each cell, and the flux of a cell is uncertain by half. Where light comes
-//! from all around, a table of these sums would add more variance than it removes. The sums are therefore
-//! shrunk towards their mean (James, Stein 1961, *Estimation with quadratic loss*) by the factor `max(0, 1 -
-//! noise / spread)`: `spread` is the sum of squared deviations, `noise` its expectation for uniform flux,
-//! given the photons' number and powers. Pure noise thus gives all cells the same flux; light through few
-//! cells keeps its distribution.
+//! photons, only a few pass through each cell, and the flux of a cell is estimated with a relative error of
+//! about one half. Where light comes from all around, a table of these estimates would add more variance than
+//! it removes. The estimates are therefore shrunk towards their mean (James, Stein 1961, *Estimation with
+//! quadratic loss*) by the factor `max(0, 1 - noise / spread)`: `spread` is the sum of squared deviations,
+//! `noise` its expectation for uniform flux, given the photons' number and powers. Pure noise thus gives all
+//! cells the same flux; light through few cells keeps its distribution.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;
@@ -33,8 +33,8 @@ const LOBE_POINTS: u32 = 32;
 /// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. Half of such
 /// a lobe goes to the cells, half to the lobe's own entry.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
-/// Minimum of the lobe entry's share of the rays, as a fraction of the lobe's share of the sum of the
-/// albedos.
+/// Minimum share of the rays for the lobe's own entry, as a multiple of
+/// `lobe albedo / (diffuse albedo + lobe albedo)`.
 const LOBE_PART: f32 = 0.25;
 
 /// Flux through the cells of the hemisphere: photon power weighted by a colour, in photon power units.
@@ -84,7 +84,7 @@ impl IncidentFlux {
         cells.map(|cell| mean + known * (cell - mean))
     }
 
-    /// Direction table for `sampling` and a reflection that is not black.
+    /// Direction table of the sampling method `sampling`. The reflection must not be black.
     pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
         match sampling {
             Sampling::Reflection => DirectionTable::of_reflection(reflector),
@@ -111,8 +111,8 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// Product table: flux times reflection. The lobe is divided between the cells and its own entry, which has
-/// the greater part of a lobe that is narrower than two cells.
+/// Product table: flux times reflection. The lobe is divided between the cells and its own entry. A lobe
+/// narrower than two cells goes mostly to its own entry.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);

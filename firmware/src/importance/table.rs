@@ -16,7 +16,7 @@ pub const ENTRIES: usize = CELLS + 1;
 /// Index of the lobe's entry.
 const LOBE: usize = CELLS;
 
-/// Shares of the gather rays that go through each cell of the hemisphere, and of those that are sampled from
+/// Shares of a gather point's rays: one for each cell of the hemisphere, and one for the rays sampled from
 /// the lobe; 34 bytes. The shares are integers, so that densities are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DirectionTable {
@@ -34,8 +34,8 @@ impl DirectionTable {
     /// Table with equal cells: the density `cos(theta) / pi`.
     pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
 
-    /// Table in proportion to `cells` and `lobe`, which are finite and not negative. If any cell is positive,
-    /// every cell gets a share.
+    /// Creates a table whose shares are in proportion to `cells` and `lobe`. These must be finite and not
+    /// negative. If any cell is positive, every cell gets a share.
     pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
         let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
         if greatest <= 0.0 {
@@ -71,9 +71,9 @@ impl DirectionTable {
         sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// Index of the first of `count` rays that is in direction bin `bin`, of `bins`, or in a later bin;
-    /// `count` if there is none. Bins divide the sequence of entries into equal parts, so that the rays of a
-    /// bin are consecutive.
+    /// Index of the first ray, out of `count` rays, in direction bin `bin` or a later bin; `count` if there
+    /// is none. The `bins` bins divide the sequence of entries into equal parts, so that the rays of a bin
+    /// are consecutive.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
@@ -91,15 +91,15 @@ impl DirectionTable {
         first_ray(pattern, count, beginning, total)
     }
 
-    /// Direction bin, out of `bins`, of ray `index` of `count`.
+    /// Direction bin of ray `index` out of `count` rays, from 0 to `bins - 1`.
     #[inline(always)]
     pub fn bin(&self, pattern: Pattern, index: u32, count: u32, bins: u32) -> u32 {
         if bins <= 1 {
             return 0;
         }
         let Place { entry, offset, size } = self.place(pattern, index, count);
-        // Index of the ray's part if the entry is divided into `bins` parts, estimated in `f32` to within 1
-        // and corrected: a division of 64-bit integers takes long.
+        // Index of the part that contains the ray when the entry is divided into `bins` parts. It is
+        // estimated in `f32` to within 1 and corrected, because a division of 64-bit integers takes long.
         let mut part = (self::part(offset, size) * bins as f32) as u32;
         let begins = |part: u32| part as u64 * size <= offset * bins as u64;
         if !begins(part) {
@@ -150,7 +150,8 @@ impl DirectionTable {
         (entry, [part(offset, size), pattern.radical_inverse(index)])
     }
 
-    /// Number of rays in each cell, out of `count`, without those of the lobe.
+    /// Number of rays, out of `count`, that each cell's entry gets. Rays of the lobe's entry are not
+    /// included.
     pub fn rays_in_cells(&self, pattern: Pattern, count: u32) -> [u16; CELLS] {
         let mut rays = [0; CELLS];
         for index in 0..count {
@@ -191,7 +192,7 @@ impl DirectionTable {
         (density > 0.0).then_some(GatherDirection { direction, weight, density, cell })
     }
 
-    /// Probability density of a direction above the surface, 1/sr.
+    /// Probability density, 1/sr, with which `sample` returns a direction above the surface.
     #[inline(always)]
     pub fn density(&self, reflector: &Reflector, direction: Vec3) -> f32 {
         let Some(cell) = cell_of(reflector.normal, direction) else { return 0.0 };
@@ -208,7 +209,7 @@ impl DirectionTable {
 }
 
 /// Position of a ray in the sequence of entries: the entry, the offset in the entry, and the size of the
-/// entry. Lengths are in units of which one share has `whole(count)`.
+/// entry. One share is `whole(count)` units long.
 struct Place {
     entry: usize,
     offset: u64,
@@ -236,7 +237,8 @@ fn jitter(pattern: Pattern, index: u32) -> u32 {
     pattern.jitter(index) >> (u32::BITS - JITTER_BITS)
 }
 
-/// Index of the first of `count` rays at or after share `beginning` of `total`; both are at most 2^25.
+/// Index of the first of `count` rays at or after the fraction `beginning / total` of the sequence of
+/// entries. Both numbers are at most 2^25.
 #[inline(always)]
 fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
     let (ray, remainder) = divide([beginning, count], total);

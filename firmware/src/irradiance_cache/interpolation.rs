@@ -20,9 +20,8 @@ impl<'a> Corners<'a> {
         self.0.into_iter().flatten()
     }
 
-    /// Error of each corner's record at a surface point; infinite without a record. Radii of validity are
-    /// clamped by those of the other corners (Křivánek 2006): by the triangle inequality,
-    /// `R_i <= R_j + |p_i - p_j|`.
+    /// Error of each corner's record at a surface point; infinite for a corner without a record. Each radius
+    /// of validity is clamped by those of the other corners, `R_i <= R_j + |p_i - p_j|` (Křivánek 2006).
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         let mut errors = [f32::INFINITY; 4];
         for (error, record) in errors.iter_mut().zip(self.0) {
@@ -92,8 +91,8 @@ impl<R: Capacity> IrradianceCache<R> {
         (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })
     }
 
-    /// Returns true if the records suffice to interpolate a sample. The result depends on their geometry
-    /// alone, and is the same before and after they are gathered.
+    /// Returns true if the records suffice to interpolate a sample. The result depends on the records'
+    /// geometry alone: it is the same before and after their light is gathered.
     pub fn covers(&self, sample: &SeenSample, allowed: f32) -> bool {
         self.weights(sample, allowed).is_some()
     }

@@ -9,7 +9,6 @@ use super::{LatticePoint, MAX_ROOTS, Window};
 
 pub(super) const WORDS: usize = LINE_BYTES / 4;
 
-/// Splits a line into words.
 pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
     let mut words = [0; WORDS];
     for (word, bytes) in words.iter_mut().zip(line.0.as_chunks().0) {
@@ -18,7 +17,6 @@ pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
     words
 }
 
-/// Joins words into a line.
 pub(super) fn line_of(words: [u32; WORDS]) -> Line {
     let mut line = Line::ZERO;
     for (bytes, word) in line.0.as_chunks_mut().0.iter_mut().zip(words) {
@@ -89,7 +87,7 @@ impl KeptRecord {
         Some(line_of_first([x, y, geometric_normal].into_iter().chain(values.map(f32::to_bits))))
     }
 
-    /// Decodes a line, whatever its content.
+    /// Decodes a record from a line, without a check of the content.
     pub(super) fn read(line: &Line) -> Option<Self> {
         let [x, y, geometric_normal, magnitude, distance, radius, rest @ ..] = words_of(line);
         let vectors = rest.as_chunks::<3>().0.first_chunk()?;

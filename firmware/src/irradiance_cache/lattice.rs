@@ -94,7 +94,7 @@ impl Cell {
         1 << (2 * level)
     }
 
-    /// Cell `number`, row-major, at `level` of the quadtree whose upper left corner is `root`.
+    /// Cell with row-major index `number` at `level` of the quadtree whose upper left corner is `root`.
     pub(super) fn in_tree(root: LatticePoint, level: u32, number: usize) -> Self {
         let [row, column] = [number as u32 >> level, number as u32 & ((1 << level) - 1)];
         let side = side(level);

@@ -1,6 +1,6 @@
 //! Parallel irradiance cache. Indirect irradiance and its gradients are gathered at few points and
-//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992). Radii of validity are
-//! clamped by those of neighbours, among the corners of a cell (Křivánek 2006).
+//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992). Each radius of validity is
+//! clamped by the radii at the other corners of a lattice cell (Křivánek 2006).
 //!
 //! The published caches are filled on demand, so that each pixel depends on the pixels before it.
 //! Steinhurst's dissertation (2007) makes the cache parallel by removing this dependence, but does not give
@@ -12,9 +12,9 @@
 //!   without a gather.
 //! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and
 //!   every point that a division would add, is within the allowed error of all four corner records.
-//! - A sample interpolates those of the four corner records of its undivided cell that are valid at the
-//!   surface it sees. Weights are continuous across cells of one size. A sample whose weights sum to too
-//!   little casts gather rays.
+//! - A sample interpolates the corner records of its undivided cell, as far as they are valid at the surface
+//!   that the sample sees. Weights are continuous across cells of one size. If the sum of the weights is too
+//!   small, the sample casts gather rays.
 //! - All records are gathered. The survey determines the coefficients of their gradients, so that gathers of
 //!   records can be reordered like all others and wait together with those of pixels. Geometry alone decides
 //!   which samples are interpolated; their light is added when all gathers of the block's records are done.
@@ -58,12 +58,12 @@ use crate::vector::max;
 
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
-/// Maximum number of records of a block of one pixel: 4 corners, and 5 further points per division.
+/// Minimum capacity of a cache: a block of one pixel has up to 4 corners, and 5 further points per division.
 pub const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// Irradiance records of a block.
 pub struct IrradianceCache<R: Capacity> {
-    /// Records by lattice point; `None` where the eye ray meets no surface with a Lambertian part first.
+    /// Records by lattice point; `None` where the eye does not see a surface with a Lambertian part directly.
     records: R::Map<LatticePoint, Option<Record>>,
     /// Upper left corners of the coarsest cells, each with a bit mask of the divided cells in the cell's
     /// quadtree ([`lattice::Cell::tree_number`]).
@@ -82,7 +82,7 @@ impl<R: Capacity> Default for IrradianceCache<R> {
 }
 
 impl<R: Capacity> IrradianceCache<R> {
-    /// A cache without records.
+    /// Creates a cache without records.
     pub const fn new() -> Self {
         Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
     }
@@ -122,8 +122,8 @@ impl<R: Capacity> IrradianceCache<R> {
         self.records.entries() as u32
     }
 
-    /// Gather point, without directions, of the record at lattice point number `index`; `None` without a
-    /// record.
+    /// Gather point of the record at lattice point number `index`, its direction table not chosen yet; `None`
+    /// without a record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
         let (&LatticePoint { x, y }, record) = self.records.entry(index as usize)?;

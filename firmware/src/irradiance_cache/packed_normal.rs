@@ -8,7 +8,6 @@ use crate::vector::{max, min, unit};
 /// Code of the octahedral coordinate 1.
 const SCALE: f32 = 32_767.0;
 
-/// A unit vector in 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PackedNormal(pub(super) u32);
 
@@ -16,7 +15,6 @@ pub(super) struct PackedNormal(pub(super) u32);
 const NONE: u32 = 0x8000_0000;
 
 impl PackedNormal {
-    /// Absence of a vector.
     pub(super) const NONE: Self = Self(NONE);
 
     pub(super) fn new(normal: Vec3) -> Self {

@@ -14,10 +14,10 @@ use crate::vector::{from_upper_half, max, min, tangents, upper_half};
 /// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// During the survey: inverse distance to the surroundings by cell of the hemisphere, 1/m, bfloat16. It
-    /// is 0 in cells that are not surveyed yet.
+    /// During the survey: inverse distance to the surroundings in each cell of the hemisphere, 1/m, bfloat16.
+    /// It is 0 in cells that are not surveyed yet.
     Surveying([u16; CELLS]),
-    /// After the survey: distances to the surroundings by cell of the hemisphere.
+    /// After the survey: distance to the surroundings in each cell of the hemisphere.
     Surveyed(Distances),
     /// During the gather: the strongest gather ray, and sums of radiance over all rays.
     Gathering(Strongest, GatherSums),
@@ -35,9 +35,9 @@ pub(super) struct GatherSums {
     rotation: [ColourSum; 2],
 }
 
-/// Strongest term of a record's sums, and the strength (sum of channels) of the second strongest term.
-/// Neither depends on the order of the terms. The type has an alignment of 1 byte, so that it fits beside the
-/// tag of [`Content`] and enlarges no record.
+/// Strongest term of a record's sums, and the strength of the second strongest term. A term is the weighted
+/// radiance of a gather ray, its strength the sum of the channels. Neither depends on the order of the terms.
+/// The type has an alignment of 1 byte, so that it fits beside the tag of [`Content`] and enlarges no record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Strongest {
     light: Rgbe,
@@ -73,15 +73,15 @@ impl Strongest {
     }
 
     /// Sort key of a term: strength, then cell and encoded radiance. The bits of non-negative `f32` numbers
-    /// have the numbers' order.
+    /// sort like the numbers.
     fn key(&self) -> [u32; 3] {
         [self.light().element_sum().to_bits(), self.cell.into(), u32::from_le_bytes(self.light.0)]
     }
 }
 
-/// Maximum of a single strong term, divided by the sum of the others. A small bright surface that the
-/// direction table does not favour is hit by a ray of only one record in many, and would show as a disc of
-/// that record's radius.
+/// Maximum strength of a record's strongest term, divided by the sum of the others, if no other term is
+/// nearly as strong. A small bright surface that the direction table does not favour is hit by a ray of only
+/// one record in many, and would show as a disc of that record's radius.
 const LONE_SHARE: f32 = 0.25;
 
 impl GatherSums {
@@ -119,9 +119,10 @@ impl GatherSums {
         }
     }
 
-    /// Limits the strongest term to the greater of the second strongest and [`LONE_SHARE`] times the sum of
-    /// the others. By rounding, the limited term may exceed this limit by 1/128. A record's only term is
-    /// kept.
+    /// Limits the strength of the strongest term to `max(second, LONE_SHARE * others)`, where `second` is the
+    /// strength of the second strongest term and `others` the sum of all terms but the strongest. The
+    /// strongest term is stored as `Rgbe`; by this rounding it may exceed the limit by about 1/128 of its
+    /// strength. A record's only term is kept.
     pub(super) fn limited(mut self, strongest: &Strongest) -> Self {
         let [strength, second] = [strongest.light().element_sum(), from_upper_half(strongest.second())];
         let others = self.mean.value().element_sum() - strength;
@@ -265,7 +266,8 @@ impl Irradiance {
 mod tests {
     use super::*;
 
-    /// Irradiance of a record whose terms are the pairs of a cell and a light, in channels 1 : 1/2 : 1/4.
+    /// Irradiance of a record whose gather rays are given as pairs of cell and light. The channels of the
+    /// light are in the proportion 1 : 1/2 : 1/4.
     fn mean(terms: impl IntoIterator<Item = (u8, f32)>) -> Irradiance {
         let (mut strongest, mut sums) = (Strongest::NONE, GatherSums::new(&[[0.5, 0.25]; CELLS]));
         for (cell, light) in terms {

@@ -36,9 +36,9 @@ type Key = [u8; KEY_BYTES];
 
 /// Location of the kept records of one picture in the lines past the card image.
 pub struct RecordStore {
-    /// Key of the picture; `None` if no records may be kept.
+    /// Parameters on which the kept records depend; `None` if no records are kept.
     key: Option<Key>,
-    /// First line that may hold kept records; `limit` is the line past the last such line.
+    /// First of the lines reserved for kept records. `limit` is the line past the last of them.
     first: u32,
     limit: u32,
     /// End of the lines in use; equal to `first` if there is no directory.
@@ -62,9 +62,9 @@ impl RecordStore {
     /// Store that keeps no records.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
-    /// Begins a frame with the lines `room` past the card image. Keeps the records of earlier frames if these
-    /// had the same lines and differ only in samples and order of work; else drops them. If the card image
-    /// has changed, [`Self::forget`] must be called.
+    /// Begins a frame. `room` is the range of lines past the card image where records may be kept. Keeps the
+    /// records of earlier frames if these had the same `room` and differ only in samples and order of work;
+    /// else drops them. If the card image has changed, [`Self::forget`] must be called.
     #[inline(never)]
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         let key = key(frame);

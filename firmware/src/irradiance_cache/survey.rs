@@ -1,9 +1,9 @@
 //! Survey: places the irradiance records of a block, level by level of the lattice.
 //!
-//! At each level, records are first placed at the corners of its cells. Then survey rays are cast from all
-//! new records, one cell of the hemisphere after another, because rays with similar directions read the same
-//! lines of the scene. Finally, cells that their corner records do not cover are divided into cells of the
-//! next level.
+//! At each level, records are first placed at the corners of its cells. Then survey rays, which measure
+//! distances, are cast from all new records. They are cast one cell of the hemisphere after another, because
+//! rays with similar directions read the same lines of the scene. Finally, cells that their corner records do
+//! not cover are divided into cells of the next level.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -21,8 +21,8 @@ use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
 use crate::vector::min;
 
-/// Minimum distance up to which a record is valid, pixels: radius of validity times `sqrt(allowed error)`. It
-/// bounds the number of records in corners of a scene.
+/// Minimum of `radius of validity * sqrt(allowed error)`, pixels: the distance up to which a record is valid.
+/// It bounds the number of records in the corners of a room.
 const MIN_REACH: f32 = 3.0;
 /// Error bound below which [`MIN_REACH`] shrinks in proportion to the bound, so that the picture converges to
 /// the picture without records as the bound approaches 0.
@@ -99,8 +99,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(Ok(()))
     }
 
-    /// Casts a bundle of rays: one in the current cell of the hemisphere for each of the next new records.
-    /// After the ray in the last cell, the survey of a record ends.
+    /// Casts a bundle of survey rays: for each of the next new records, one ray in the current cell of the
+    /// hemisphere. After its ray in the last cell, the survey of a record ends.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
@@ -142,8 +142,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(())
     }
 
-    /// Returns whether four records suffice for a cell: each has an error below `allowed` at every corner and
-    /// at every point that a division would add.
+    /// Returns whether the corner records suffice for a cell: there are four, and each has an error below
+    /// `allowed` at every corner and at every point that a division would add.
     fn is_covered<M: MemoryPort>(
         &self,
         context: &mut Context<M>,
@@ -193,7 +193,8 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// Random ray from a record's surface in a cell of its hemisphere; `None` if it points below the triangle.
+/// Random ray from a record's surface through a cell of its hemisphere; `None` if it points below the
+/// triangle.
 fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, cell: u8) -> Option<Ray> {
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];

@@ -1,5 +1,5 @@
-//! Families of containers of one capacity. On a board the capacity is part of the containers' types; where
-//! chips are emulated, it is a value.
+//! Families of container types (vector, map, array, candidate buffer) with a common capacity. On a board the
+//! capacity is part of the types; in an emulator it is a runtime value.
 
 use core::hash::Hash;
 
@@ -8,7 +8,7 @@ use heapless::index_map::FnvIndexMap;
 
 use crate::photon::{CandidateBuffer, CandidateStorage};
 
-/// A family of containers with one capacity: a maximum number of entries.
+/// A family of container types with a common capacity, the maximum number of entries.
 ///
 /// The containers are associated types, so that a chip has one type parameter instead of one per container.
 pub trait Capacity: 'static {
@@ -28,7 +28,7 @@ pub trait FixedCapacity: Capacity {
     const ENTRIES: usize;
 }
 
-/// Capacity of `N` entries.
+/// Family of containers with the constant capacity `N`.
 pub struct Entries<const N: usize>;
 
 impl<const N: usize> Capacity for Entries<N> {
@@ -68,7 +68,7 @@ pub trait Buffer<T> {
     /// The value itself if the vector is full.
     fn push(&mut self, value: T) -> Result<(), T>;
 
-    /// Removes the last value.
+    /// Removes the last value and returns it; `None` if the vector is empty.
     fn pop(&mut self) -> Option<T>;
 
     /// Sets the number of values. Values that are added are clones of `value`. Returns false, and changes
@@ -121,15 +121,15 @@ impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     }
 }
 
-/// A type with a constant initial value, so that large values are initialised in place.
+/// A type with a constant initial value, by which large arrays are initialised in place.
 pub trait Vacant {
-    /// Initial value: not in use.
+    /// Value of an entry that is not in use.
     const VACANT: Self;
 }
 
 /// An array of values, all [`Vacant::VACANT`] at first.
 pub trait Array<T> {
-    /// Array of [`Vacant::VACANT`] values, before [`Self::reserve`].
+    /// Initial array. All values are [`Vacant::VACANT`]; their number may be 0 before [`Self::reserve`].
     const VACANT: Self;
 
     /// Sets the length; has no effect if the type determines it.
@@ -176,10 +176,10 @@ pub trait Map<K, V> {
     /// Value at `key`.
     fn get(&self, key: &K) -> Option<&V>;
 
-    /// Key and value at an index, in insertion order.
+    /// Key and value of entry number `index` in insertion order; `None` past the last entry.
     fn entry(&self, index: usize) -> Option<(&K, &V)>;
 
-    /// Key and mutable value at an index, in insertion order.
+    /// Key and mutable value of entry number `index` in insertion order; `None` past the last entry.
     fn entry_mut(&mut self, index: usize) -> Option<(&K, &mut V)>;
 
     /// Appends an entry, or replaces the value at its key. Returns false if the map is full.

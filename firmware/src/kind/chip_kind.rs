@@ -11,14 +11,14 @@ use crate::memory::CacheEntry;
 pub trait ChipKind: 'static {
     /// Containers with capacity [`Budget::tile_pixels`].
     type TilePixels: Capacity;
-    /// Containers with capacity [`gather_candidates`] of [`Budget::neighbors`].
+    /// Containers whose capacity is [`gather_candidates`] for [`Budget::neighbors`] neighbours.
     type Candidates: Capacity;
     /// Containers with capacity [`Budget::gather_queue`].
     type GatherQueue: Capacity;
     /// Containers with capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
-    /// Containers for the gather points whose rays are cast together: those of the irradiance records of a
-    /// block, or of a run of its pixels.
+    /// Containers for gather points whose rays are cast together: the points of all irradiance records of a
+    /// block, or of some consecutive pixels of it.
     type Points: Capacity;
     /// Containers with capacity [`Budget::in_flight`].
     type Flights: Capacity;
@@ -38,11 +38,11 @@ pub trait FixedKind:
         Flights: FixedCapacity,
     >
 {
-    /// The value of the kind's type.
+    /// The kind itself, as a constant.
     const KIND: Self;
     /// Budget of the kind, as [`ChipKind::budget`] returns it.
     const BUDGET: Budget;
-    /// Upper limits of the on-chip memory that each technique adds.
+    /// Upper limits of the on-chip memory that each technique adds to the chip, checked at compile time.
     const TECHNIQUE_LIMITS: TechniqueMemory;
 }
 

@@ -6,8 +6,8 @@ use super::capacity::Entries;
 use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 use super::reference::REFERENCE;
 
-/// Budget of the large chip: a longer gather queue, enough tiles in flight to fill it, and a scene cache of
-/// 128 KB.
+/// Budget of the large chip: `REFERENCE` with 2 MB of SRAM, a scene cache of 128 KB, a longer gather queue,
+/// and four tiles in flight to fill it.
 pub const LARGE: Budget = Budget {
     sram_bytes: 2 << 20,
     scene_cache_bytes: 128 << 10,

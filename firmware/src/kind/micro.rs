@@ -1,4 +1,4 @@
-//! The micro chip, which has the whole renderer in the SRAM of a microcontroller.
+//! The micro chip, whose budget is that of a microcontroller: the whole renderer fits into its SRAM.
 
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
 

@@ -1,10 +1,10 @@
-//! Kinds of chip. A kind is a [`Budget`](photoncard_shared::budget::Budget) and the capacities of the buffers
-//! that follow from it.
+//! Kinds of chip. A kind is a [`Budget`](photoncard_shared::budget::Budget) and the buffer capacities that
+//! follow from the budget.
 //!
-//! Each file here is a kind: the constant of its budget, the limits of its techniques, and implementations of
-//! [`ChipKind`] and [`FixedKind`]. The kind is the only capacity parameter of [`Chip`](crate::chip::Chip) and
-//! [`Card`](crate::card::Card). An emulator adds one kind whose capacities are values, so that one copy of
-//! the chip's code emulates all kinds.
+//! Each of the files `large`, `micro` and `reference` defines a kind: its budget, the memory limits of its
+//! techniques, and implementations of [`ChipKind`] and [`FixedKind`]. The kind is the only capacity parameter
+//! of [`Chip`](crate::chip::Chip) and [`Card`](crate::card::Card). An emulator adds one kind whose capacities
+//! are runtime values. One compiled copy of the chip's code then emulates all kinds.
 
 mod capacity;
 mod chip_kind;

@@ -7,8 +7,8 @@ use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB
-/// (section 7.3.2). Tiles have up to 64x64 pixels (16x16 in the dissertation). With one tile in flight there
-/// is room for a long gather queue and for gather points of half a tile.
+/// (section 7.3.2). Tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves
+/// memory for a long gather queue and for the gather points of half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: REFERENCE_DRAM_BYTES,
@@ -53,6 +53,6 @@ impl FixedKind for Reference {
     };
 }
 
-/// Buffer of candidates for photon searches on the host, with up to as many neighbours as [`REFERENCE`]
-/// allows.
+/// Candidate buffer for photon searches on the host. It suffices for the maximum number of neighbours of
+/// [`REFERENCE`].
 pub type ReferenceCandidates = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;

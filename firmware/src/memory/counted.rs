@@ -7,8 +7,8 @@ use photoncard_shared::message::Fault;
 
 use super::{CardMemory, MemoryPort, Stage, Traffic};
 
-/// Memory port that counts the traffic to the memory it wraps. Above a cache it counts the chip's requests,
-/// below a cache the cache's misses and the reads that fill its lines.
+/// Memory port that counts the traffic to the memory it wraps. Between chip and cache it counts the chip's
+/// requests. Between cache and DRAM it counts the cache's misses and the reads that fill its lines.
 pub struct Counted<M> {
     memory: M,
     stage: Stage,

@@ -76,8 +76,8 @@ impl CardMemory for Dram<'_> {
     }
 
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
-        // `black_box` hides the place from the compiler, which could otherwise join this store with others to
-        // one of a word.
+        // `black_box` hides the address from the compiler, which could otherwise merge this store with others
+        // into the store of a word.
         *black_box(self.lines.get_mut(address.0 as usize)?.0.get_mut(place)?) = byte;
         Some(())
     }

@@ -1,7 +1,7 @@
 //! Set-associative caches of lines with LRU replacement.
 //!
-//! [`LineCaches`] serves two purposes. On a board with slow DRAM, it keeps lines in on-chip memory; over a
-//! [`super::Counted`] it simulates the fetches of a chip with caches of this shape. The cached data are used
+//! [`LineCaches`] serves two purposes. On a board with slow DRAM, it keeps lines in on-chip memory. Around a
+//! [`super::Counted`], it simulates the fetches of a chip with caches of this shape. The cached data are used
 //! in both cases, so that simulated hits are hits by construction, and a wrong line would show in the
 //! picture.
 
@@ -14,7 +14,7 @@ use photoncard_shared::message::Fault;
 use super::{CardMemory, MemoryPort, Stage, outside};
 use crate::sampler::hash;
 
-/// Mapping from the index of a cache line in card memory to its set.
+/// Mapping from the index of a block of card memory, as long as a cache line, to its set in the cache.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SetIndex {
     /// Index modulo the number of sets.
@@ -132,8 +132,8 @@ impl CacheEntry {
     pub const EMPTY: Self = Self { block: NOTHING, slot: 0 };
 }
 
-/// Set-associative cache with LRU replacement, in buffers of the caller: [`CacheShape::entries`] tags and
-/// [`CacheShape::lines`] lines, as arrays on a board and vectors on a host.
+/// Set-associative cache with LRU replacement. The caller provides its buffers, [`CacheShape::entries`] tags
+/// and [`CacheShape::lines`] lines: arrays on a board, vectors on a host.
 pub struct LineCache<E, L> {
     shape: CacheShape,
     /// Tags by set; within a set, from the most to the least recently used.
@@ -142,8 +142,8 @@ pub struct LineCache<E, L> {
     /// True if the cache is known to be empty. The thousands of writes that load a card image then need not
     /// invalidate lines.
     is_clear: bool,
-    /// Number of lines of the memory, once a cache line that extends past the last of them was filled;
-    /// `u32::MAX` before.
+    /// Number of lines of the memory. It becomes known when a cache line that extends past the end of the
+    /// memory is filled; `u32::MAX` before.
     end: u32,
 }
 

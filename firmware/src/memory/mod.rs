@@ -1,8 +1,8 @@
 //! Card memory as the chip reads it: lines, by index.
 //!
-//! Layers between a chip and its DRAM are [`MemoryPort`]s over a [`MemoryPort`]: [`LineCaches`] caches lines,
-//! [`Counted`] counts reads. The plain [`Dram`] has no overhead: it borrows slices, and neither copies nor
-//! counts.
+//! Each layer between a chip and its DRAM is a [`MemoryPort`] that wraps another: [`LineCaches`] caches
+//! lines, [`Counted`] counts reads. The plain [`Dram`] has no overhead: it borrows slices, and neither copies
+//! nor counts.
 
 mod counted;
 mod dram;
@@ -19,7 +19,7 @@ pub use photoncard_shared::address::{STAGES, Stage};
 use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, Traffic};
 
-/// Access of a chip to card memory. Caches and counters are `MemoryPort`s over another `MemoryPort`.
+/// Access of a chip to card memory. Caches and counters are `MemoryPort`s that wrap another `MemoryPort`.
 pub trait MemoryPort {
     /// Reads a line that belongs to `structure`. The chip uses the bytes in `used`.
     ///
@@ -44,7 +44,7 @@ pub trait MemoryPort {
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}
 
-    /// Notifies the port that its last reads filled one line of the cache above.
+    /// Notifies the port that its last reads filled one line of the cache that wraps it.
     #[inline(always)]
     fn missed(&mut self, _: Structure) {}
 

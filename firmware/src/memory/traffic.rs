@@ -9,7 +9,7 @@ pub struct Reads {
     pub requests: u64,
     /// Number of bytes used by the chip.
     pub bytes: u64,
-    /// Number of cache lines that the cache above missed; 0 without a cache.
+    /// Number of misses of the cache between the chip and this memory; 0 without a cache.
     pub misses: u64,
 }
 
@@ -51,7 +51,7 @@ impl Traffic {
         reads.bytes += bytes as u64;
     }
 
-    /// Counts a miss of the cache above.
+    /// Counts a miss of the cache between the chip and this memory.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
     pub(super) fn count_miss(&mut self, stage: Stage, structure: Structure) {
@@ -64,13 +64,13 @@ impl Traffic {
         self.reads[stage as usize][structure as usize]
     }
 
-    /// Sum of the reads of chosen structures over all stages of tiles, which are all stages but
+    /// Sum of the reads of structures for which `chosen` returns true, over the stages of tiles: all but
     /// [`Stage::Begin`].
     pub fn of_tiles(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
         self.sum(|stage, structure| stage != Stage::Begin && chosen(structure))
     }
 
-    /// Sum of the reads over chosen pairs of stage and structure.
+    /// Sum of the reads over all pairs of stage and structure for which `chosen` returns true.
     pub fn sum(&self, chosen: impl Fn(Stage, Structure) -> bool) -> Reads {
         let mut sum = Reads::ZERO;
         for stage in Stage::ALL {

@@ -1,37 +1,37 @@
-//! Candidates of a search for the nearest photons. Squared distances and contents are in separate arrays, for
-//! vector instructions.
+//! Candidates of a search for the nearest photons. Their squared distances and contents are in separate
+//! arrays, for vector instructions.
 
 use core::cell::Cell;
 
 use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
-/// A photon near the query: its squared distance and its content.
+/// A photon found by a search: its squared distance from the query position, and its content.
 ///
-/// Candidates are ordered by distance, then by content. The order depends neither on the map's layout nor on
-/// photon indices. Candidates that compare equal are interchangeable in any sum.
+/// Candidates are ordered by distance, then by content ([`Self::order`]). The order does not depend on the
+/// photons' order in memory. Candidates that compare equal are interchangeable in any sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// Squared distance from the query, m^2, as the bits of an `f32`.
     pub(super) distance: u32,
-    /// Content of the photon as a little-endian number, with the splitting axis cleared.
+    /// Power, direction and flags of the photon as a little-endian number, with the splitting axis cleared.
     pub(super) content: u64,
 }
 
-/// Odd factor that permutes contents in the order, so that ties favour neither bright nor dim photons.
+/// Odd factor that scrambles contents, so that ties favour neither bright nor dim photons.
 const SCRAMBLE: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mask that clears the splitting axis in a photon's content.
 const WITHOUT_AXIS: u64 = !(3 << 48);
 
 impl Candidate {
-    /// Candidate for a photon at a squared distance, m^2, which must not be negative.
+    /// Creates a candidate from a photon's content and its squared distance, m^2, which must not be negative.
     #[inline(always)]
     pub fn new(distance_squared: f32, content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
         // Non-negative floats compare like their bits.
         Self { distance: distance_squared.to_bits(), content: u64::from_le_bytes(content) & WITHOUT_AXIS }
     }
 
-    /// Sort key: bits of the squared distance, then the permuted content.
+    /// Sort key: bits of the squared distance, then the scrambled content.
     #[inline(always)]
     pub fn order(&self) -> (u32, u64) {
         (self.distance, self.content.wrapping_mul(SCRAMBLE))
@@ -82,7 +82,7 @@ impl Candidate {
         Photon::disc_of_flags(self.flags())
     }
 
-    /// Returns whether the photon came straight from a light. In the caustic map: whether it came from a
+    /// Returns true if the photon came from a light without a bounce; in the caustic map, if it came from a
     /// light with an area.
     #[inline(always)]
     pub fn is_direct(&self) -> bool {
@@ -90,12 +90,12 @@ impl Candidate {
     }
 }
 
-/// Storage for candidates, with a capacity that is part of its type or set at run time.
+/// Storage for candidates. Its capacity is fixed by the type, or set at run time by `Self::reserve`.
 pub trait CandidateStorage {
     /// Zeroed storage.
     const EMPTY: Self;
 
-    /// Sets the capacity, if the type leaves it open.
+    /// Sets the capacity, in candidates. Has no effect if the type fixes the capacity.
     fn reserve(&mut self, _entries: usize) {}
 
     /// View of the whole storage.
@@ -129,7 +129,7 @@ impl<const N: usize> CandidateBuffer<N> {
         Self { distances: [0; N], contents: [0; N] }
     }
 
-    /// Copies candidates into the buffer, as many as fit. Returns a view of the copies.
+    /// Copies as many candidates as fit into the buffer. Returns a view of the copies.
     pub fn fill(&mut self, candidates: &[Candidate]) -> Candidates<'_> {
         let length = candidates.len().min(N);
         let mut view = self.view();
@@ -148,14 +148,14 @@ impl<const N: usize> CandidateBuffer<N> {
     }
 }
 
-/// Mutable view of candidates: two slices of equal length, of distance bits and of contents.
+/// Mutable view of candidates: two slices of equal length, one of squared distances and one of contents.
 pub struct Candidates<'a> {
     pub(super) distances: &'a mut [u32],
     pub(super) contents: &'a mut [u64],
 }
 
 impl<'a> Candidates<'a> {
-    /// View of two slices of equal length: bits of squared distances, m^2, and contents of photons.
+    /// View of two slices of equal length: squared distances as `f32` bits, m^2, and contents of photons.
     #[inline(always)]
     pub fn new(distances: &'a mut [u32], contents: &'a mut [u64]) -> Self {
         Self { distances, contents }
@@ -188,7 +188,7 @@ impl<'a> Candidates<'a> {
         })
     }
 
-    /// Sets candidate `index`. Has no effect out of range.
+    /// Sets candidate `index`. Has no effect if `index` is out of range.
     #[inline(always)]
     pub(super) fn set(&mut self, index: usize, candidate: Candidate) {
         if let (Some(distance), Some(content)) = (self.distances.get_mut(index), self.contents.get_mut(index))
@@ -207,7 +207,7 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// View of candidates with interior mutability, so that the view can be copied.
+/// View of candidates with interior mutability. Unlike `Candidates`, it can be copied.
 #[derive(Clone, Copy)]
 pub(super) struct CandidateCells<'a> {
     distances: &'a [Cell<u32>],

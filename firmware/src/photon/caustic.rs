@@ -1,11 +1,11 @@
-//! Radiance reflected from caustic photons. Each photon is spread over a disc with its own radius: a kernel
-//! estimate with sample-point bandwidths (Abramson 1982, *On bandwidth variation in kernel estimates*).
+//! Density estimate of the radiance that caustic photons reflect. Each photon is spread over a disc with its
+//! own radius (variable bandwidth: Abramson 1982, *On bandwidth variation in kernel estimates*).
 //!
-//! `L = sum f(incoming) power K(d / h)`, over the photons of the surface within their radii `h`, with the
-//! Epanechnikov kernel `K = 2 (1 - d^2 / h^2) / (pi h^2)`. The integral of the kernel over a plane is 1, so
-//! that a photon contributes its power whatever the density of others. The host chooses each radius from the
-//! density of the light that the photon belongs to. Boxes of the tree contain the discs of their photons, so
-//! that a search visits the boxes that contain its position.
+//! `L = sum f(incoming) power K(d)`, with the Epanechnikov kernel `K(d) = 2 (1 - d^2 / h^2) / (pi h^2)`. The
+//! sum is over the photons of the surface whose distance `d` is less than their radius `h`. The integral of
+//! the kernel over a plane is 1: each photon contributes its power. The host chooses each radius from the
+//! density of photons with similar directions. The boxes of the tree contain the discs of their photons, so
+//! that a search visits only the boxes around its position.
 
 use core::f32::consts::PI;
 
@@ -22,10 +22,10 @@ use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::vector::max;
 
-/// Light that caustic photons bring to a point.
+/// Result of a caustic density estimate at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Caustics {
-    /// Reflected radiance, in the unit to which the partial reflection converts photon power units/m^2.
+    /// Reflected radiance, photon power units/(sr m^2), times the weight in the `PartialReflection`.
     pub radiance: Vec3,
     /// Number of photons of the point's surface whose discs contain the point.
     pub photons: u32,
@@ -33,7 +33,7 @@ pub struct Caustics {
     pub normals_decoded: u32,
 }
 
-/// Photons that light a lobe. All photons light the Lambertian part.
+/// Choice of the photons that are gathered for a lobe. For the Lambertian part, all are gathered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LitBy {
     /// All photons.
@@ -42,7 +42,7 @@ pub enum LitBy {
     Punctual,
 }
 
-/// Radiance of caustic photons reflected at a position ([`CausticSearch`]).
+/// Radiance that caustic photons reflect at the position of a [`CausticSearch`].
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -59,30 +59,30 @@ pub struct CausticSearch<'s, M> {
     pub memory: &'s mut M,
     /// Query position, metres.
     pub position: Vec3,
-    /// Maximum kernel radius of a photon, metres: that of the last code of [`kernel_share`].
+    /// Maximum kernel radius of a photon, metres: the radius at which [`kernel_share`] is 1.
     pub max_radius: f32,
     /// Reflection at the position.
     pub reflection: &'s PartialReflection,
     /// Lobe of the reflection.
     pub lobe: DecodedLobe,
-    /// Photons that light the lobe.
+    /// Photons that are gathered for the lobe.
     pub lit_by: LitBy,
-    /// Unit shading normal `n` and unit normal `g` of the triangle. A photon from the direction `i` is
-    /// weighted by `n.i / g.i`, because the density of photons is the irradiance of the triangle.
+    /// `[n, g]`: unit shading normal and unit normal of the triangle. A photon from the direction `i` has the
+    /// weight `n.i / g.i`, because the density of photons includes the factor `g.i` instead of `n.i`.
     pub normals: [Vec3; 2],
 }
 
-/// Maximum of `n.i / g.i`, for light at grazing incidence on the triangle.
+/// Maximum of the weight `n.i / g.i` (`CausticSearch::normals`).
 const MAX_SHADING: f32 = 4.0;
-/// Maximum distance of a box that a search visits, cells of the photon grid. It allows for rounding at the
-/// borders of the scene.
+/// Maximum distance from the position to a box that a search visits, in cells of the photon grid. It allows
+/// for rounding at the borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Slope of the direction to a photon, against the tangent plane, that is allowed for the rounding of coded
+/// Slope against the tangent plane that the direction to a photon may have because of the rounding of coded
 /// normals.
 const FLAT_SLOPE: f32 = 0.15;
-/// Unit of a photon's factor `(1 - d^2 / h^2) / s` in the sums, where `s` is the disc's area over the maximum
-/// area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`], and one with the
-/// largest disc has a resolution of twenty bits.
+/// Divisor of a photon's factor `(1 - d^2 / h^2) / s` in the sums, where `s` is the area of the photon's disc
+/// divided by the maximum area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`];
+/// a photon with the largest disc has a resolution of twenty bits.
 const FACTOR_UNIT: f32 = 32_768.0;
 
 impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
@@ -117,9 +117,9 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
     }
 }
 
-/// Sums over the photons whose discs contain the position. The order of photons does not matter.
+/// Sums over the photons whose discs contain the position; independent of the photons' order.
 struct Sums<'a> {
-    /// Squared maximum distance of a box that the search visits, m^2.
+    /// Squared maximum distance of a box that the search visits, m^2 (`MARGIN_CELLS`).
     limit: f32,
     /// Squared maximum kernel radius, m^2.
     max_squared: f32,
@@ -128,17 +128,17 @@ struct Sums<'a> {
     lit_by: LitBy,
     normals: [Vec3; 2],
     surface: SameSurface,
-    /// Bit mask of the classes of normals that photons of the surface can have ([`SameSurface::classes`]).
+    /// Bit mask of the classes of the normals of the surface's photons ([`SameSurface::classes`]).
     classes: u16,
-    /// Sum of power times kernel factor, in units of [`FACTOR_UNIT`].
+    /// Sum of power times kernel factor, divided by [`FACTOR_UNIT`].
     power: ColourSum,
-    /// Sum of power times kernel factor times [`PartialReflection::lobe_factor`].
+    /// The same sum, with each term times [`PartialReflection::lobe_factor`].
     of_lobe: ColourSum,
     photons: u32,
 }
 
 impl Sums<'_> {
-    /// Adds a photon; `way` is the vector from the photon to the position, metres.
+    /// Adds a photon of the surface if its disc contains the position. `way` points from photon to position.
     #[inline(always)]
     fn add(&mut self, photon: &Candidate, way: Vec3) {
         let share = kernel_share(photon.disc());
@@ -162,9 +162,10 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns whether a photon may be on the surface; `cosine` is the cosine between the normals of photon
-    /// and surface. Two points of a sphere whose normals are at an angle `t` lie in a direction at `t / 2` to
-    /// the tangent plane. Photons farther off the plane are on another sheet, such as the far side of a wall.
+    /// Returns true if a photon may lie on the surface. `cosine` is the cosine between the normals of photon
+    /// and surface. On a sphere, the line between two points whose normals enclose the angle `t` is at
+    /// `t / 2` to the tangent planes. Photons farther off the tangent plane are on another sheet, such as the
+    /// far side of a wall.
     #[inline(always)]
     fn is_on_surface(&self, distance_squared: f32, way: Vec3, cosine: f32) -> bool {
         let [_, geometric] = self.normals;
@@ -174,7 +175,7 @@ impl Sums<'_> {
         height * height <= slope_squared * across_squared + self.limit
     }
 
-    /// Factor `n.i / g.i`, at most [`MAX_SHADING`]; 0 for light from below the horizon of `n`.
+    /// Weight `n.i / g.i` of a photon, at most [`MAX_SHADING`]; 0 for light from below the horizon of `n`.
     #[inline(always)]
     fn shading(&self, photon: &Candidate) -> f32 {
         let [shading, geometric] = self.normals;

@@ -1,27 +1,27 @@
-//! Interface between a search of leaves and the collector of its photons, which sets the search radius.
+//! Interface between the search of a photon tree and the collector of the photons found.
 
 use photoncard_shared::layout::PhotonNode;
 
 use crate::simd::{Isa, LANES};
 
-/// Collector of the photons or irradiance points that a search finds. It limits the search radius.
+/// Collector of the photons or irradiance points that a search finds. It also sets the search radius.
 pub(super) trait Collector {
     /// Squared search radius, m^2.
     fn limit(&self) -> f32;
 
-    /// Narrows the search at the first node with a [`PhotonNode::photon_share`], if the search can be
-    /// repeated with a larger radius.
+    /// Narrows the search radius by a visited node's [`PhotonNode::photon_share`]. Only collectors whose
+    /// search can be repeated with a larger radius implement this.
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 
-    /// Bit mask of those children of a node whose photons the collector does not need.
+    /// Bit mask of the children of a node that the search need not visit.
     #[inline(always)]
     fn skipped(&self, _node: PhotonNode) -> u16 {
         0
     }
 
-    /// Adds those photons in the first `count` lanes that belong to the result: within [`Self::limit`], or
-    /// with a disc that contains the query.
+    /// Tests the photons in the first `count` lanes, and adds those that belong to the result: photons within
+    /// [`Self::limit`], or photons whose disc contains the query.
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes);
 }
 
@@ -29,7 +29,7 @@ pub(super) trait Collector {
 pub(super) struct Lanes<'a> {
     /// Bits of the squared distances, m^2.
     pub(super) distances: &'a [u32; LANES],
-    /// Contents of the photons, each read as a little-endian `u64`.
+    /// Contents of the photons, as little-endian numbers.
     pub(super) contents: &'a [u64; LANES],
     /// Vectors from the photons to the query, by axis, metres.
     pub(super) ways: [&'a [f32; LANES]; 3],

@@ -1,9 +1,9 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*). The host estimates the
-//! irradiance at points on all surfaces by the chip's gathers. A Lambertian surface uses the irradiance of
-//! the nearest point.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*). The host precomputes
+//! the irradiance at points on all surfaces. At a Lambertian surface, the irradiance of the nearest point
+//! replaces a density estimate.
 //!
-//! The points have a tree of their own, whose leaves have the format of photon leaves. As the search is for
-//! one point, the distance of the first point found becomes the search radius.
+//! The points are in a tree of their own, whose leaves have the format of photon leaves. The search is for
+//! one point: the distance of the nearest point found so far is the search radius.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -17,7 +17,7 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{self, Isa, Kernel};
 
-/// Sections with the nodes and the leaves of irradiance points.
+/// Sections of the nodes and of the leaves of irradiance points.
 const SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
 /// Result of a search for an irradiance point.
@@ -29,9 +29,9 @@ pub struct FoundIrradiance {
     pub tested: u32,
 }
 
-/// Returns the irradiance at the point nearest to `position`, within `max_distance` metres, among points of
-/// surfaces whose normal agrees with the code `normal` ([`SameSurface`]). Contents of points break ties
-/// between equal distances.
+/// Finds the irradiance point nearest to `position`, within `max_distance` metres, and returns its
+/// irradiance. Only points whose normal agrees with `normal`, the code of the surface normal, are considered
+/// ([`SameSurface`]). Contents of points break ties between equal distances.
 ///
 /// # Errors
 /// If the card image is invalid.

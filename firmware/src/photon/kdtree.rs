@@ -1,6 +1,6 @@
-//! The photon map as a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*,
-//! chapter 6). Every node is a photon. The children of node i are nodes 2 i + 1 and 2 i + 2, so that no
-//! pointers are needed.
+//! Search of a photon map that is a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using
+//! Photon Mapping*, chapter 6). Every node is a photon. The children of node `i` are nodes `2 i + 1` and
+//! `2 i + 2`.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -17,14 +17,14 @@ use crate::simd::Isa;
 
 const PHOTONS_PER_LINE: u32 = Photon::PER_LINE as u32;
 
-/// A subtree on the stack: its root, and the squared distance to its splitting plane, m^2.
+/// Stack entry: the root of a subtree, and a lower bound of its squared distance from the query, m^2.
 struct Deferred {
     node: u32,
     distance_squared: f32,
 }
 
-/// Collects in `nearest` the photons nearest to `position` among those that `filter` accepts. Returns the
-/// number of photons tested, one per visited node.
+/// Collects in `nearest` the photons nearest to `position` that `filter` accepts. Returns the number of
+/// photons tested, one per visited node.
 ///
 /// # Errors
 /// If the card image is invalid.

@@ -1,5 +1,5 @@
-//! Search of the line layout of a photon map: leaves of one line each, below inner nodes with up to sixteen
-//! children.
+//! Search of a photon map that is a tree with leaves. An inner node has up to sixteen children; nodes and
+//! leaves take one line of memory each.
 
 use glam::Vec3;
 use photoncard_shared::budget::PHOTON_STACK;
@@ -18,8 +18,8 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Collects in `nearest` the photons or irradiance points nearest to `position` among those that `filter`
-/// accepts. The tree's nodes and leaves are in the two given sections. Returns the number of photons tested.
+/// Collects in `nearest` the photons or irradiance points near `position` that `filter` accepts. The tree's
+/// nodes and leaves are in the two given sections. Returns the number of photons tested.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -60,8 +60,8 @@ pub(super) fn gather(
     Ok(tested)
 }
 
-/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. The
-/// distances are computed like those to photons, so that they are lower bounds in spite of rounding.
+/// Squared distances to the boxes of a node's children, as bits; [`BEYOND`] for those above `limit`. They are
+/// computed like distances to photons, so that they are lower bounds in spite of rounding.
 #[inline(always)]
 fn distances_to_boxes(
     isa: impl Isa,
@@ -94,7 +94,7 @@ fn distances_to_boxes(
     distances
 }
 
-/// Hands the photons of a leaf that `filter` accepts to `nearest`. Returns the number of photons in the leaf.
+/// Hands a leaf's photons that `filter` accepts to `nearest`. Returns the number of photons in the leaf.
 #[inline(always)]
 fn test_leaf(
     isa: impl Isa,

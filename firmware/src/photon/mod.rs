@@ -1,4 +1,4 @@
-//! Photon maps: search for the k nearest photons, radiance estimates, precomputed irradiance.
+//! Photon maps: search for the k nearest photons, density estimates of radiance, and precomputed irradiance.
 
 mod candidates;
 mod caustic;
@@ -34,14 +34,14 @@ use crate::simd::{self, Isa, Kernel};
 /// One of the two photon maps of a card image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonMap {
-    /// The photon map: every arrival of light at a surface that is not specular.
+    /// The photon map: one photon for each arrival of light at a surface that is not specular.
     Indirect,
     /// The caustic map (`L S+ D`): photons with at least one bounce, whose bounces were all specular.
     Caustics,
 }
 
 impl PhotonMap {
-    /// Sections with the map's nodes and leaves.
+    /// Sections of the map's nodes and of its leaves.
     #[inline(always)]
     fn sections(self) -> [SectionKind; 2] {
         match self {
@@ -51,8 +51,8 @@ impl PhotonMap {
     }
 }
 
-/// Collects in `nearest` the photons of a map nearest to `position`. The result is the same in both layouts
-/// of the map. Returns the number of photons tested.
+/// Collects in `nearest` the photons of a map that are nearest to `position`. Returns the number of photons
+/// tested. A kd-tree and a tree with leaves give the same photons.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -67,8 +67,7 @@ pub fn gather(
     simd::run(Search { scene, memory, map, position, nearest })
 }
 
-/// Collects in `nearest` the photons of a map nearest to `position` in the region that `position` sees.
-/// Returns the number of photons tested.
+/// Does [`gather`] for the photons in the region that is visible from `position`.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -84,8 +83,8 @@ pub fn gather_visible(
     simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
 }
 
-/// First squared search radius in a visible region, divided by `r^2 (pi r^2 / A)`: `r` is the distance of the
-/// k-th photon of an unrestricted search, `A` the region's area within `r`.
+/// Factor of the initial squared search radius in a visible region, `VISIBLE_MOST r^2 (pi r^2 / A)`. `r` is
+/// the distance of the k-th photon in the whole sphere, and `A` is the region's area within `r`.
 const VISIBLE_MOST: f32 = 1.35;
 
 /// Parameters of a gather.
@@ -95,18 +94,17 @@ pub struct GatherLimits {
     pub neighbors: u32,
     /// Maximum distance of a photon, metres.
     pub max_distance: f32,
-    /// Gather radius, metres, above which the point is tested for an object close above it. In such a narrow
-    /// gap the photons around do not represent the point's light.
+    /// Gather radius, metres, above which a ray tests whether an object covers the point closely. In the
+    /// narrow gap below such an object, the nearest photons do not represent the light at the point.
     pub free_within: f32,
 }
 
-/// Maximum radius of a visible region, divided by the distance of the k-th photon of an unrestricted search.
-/// Visible photons are farther away where most photons are hidden.
+/// Maximum radius of a visible region, divided by the distance of the k-th photon in the whole sphere.
 const MAX_REACH: f32 = 2.0;
 
-/// Radiance that the photon map's photons reflect at a position. Where walls may hide photons, only those in
-/// the region that the position sees are used. `count` is called with the result of each of the one or two
-/// searches: the number of photons tested, the photons, and their light.
+/// Radiance that the nearest photons of the photon map reflect at a position. If walls may hide photons, a
+/// second search is limited to the region that is visible from the position. `count` is called after each
+/// search, with the number of photons tested, the photons found, and their reflected light.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -150,7 +148,7 @@ pub fn gathered_radiance(
 
 /// Kernel of [`gather`].
 pub struct Search<'s, 'n, M> {
-    /// The scene, with its photon map.
+    /// The scene, with its photon maps.
     pub scene: &'s SceneImage,
     /// Card memory.
     pub memory: &'s mut M,
@@ -192,8 +190,8 @@ impl<M: MemoryPort> Kernel for VisibleSearch<'_, '_, M> {
     }
 }
 
-/// Collects the nearest photons of a map among those that a filter accepts. Returns the number of photons
-/// tested.
+/// Collects in `nearest` the photons of a map that are nearest to the position `query.0` and that the filter
+/// `query.1` accepts. Returns the number of photons tested.
 #[inline(always)]
 fn search<M: MemoryPort>(
     isa: impl Isa,
@@ -219,7 +217,7 @@ fn search<M: MemoryPort>(
     Ok(tested)
 }
 
-/// Kernel that selects the nearest of given candidates, as [`NearestPhotons`] does during a search.
+/// Kernel that selects the nearest of given candidates, in the way of [`NearestPhotons`].
 pub struct Selection<'a> {
     /// Candidates to select from.
     pub candidates: Candidates<'a>,
@@ -230,9 +228,9 @@ pub struct Selection<'a> {
 impl Kernel for Selection<'_> {
     type Output = Option<Candidate>;
 
-    /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of them. The
-    /// remaining elements are then meaningless. Returns `None`, and changes nothing, if `count` is 0 or above
-    /// the number of candidates.
+    /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of these. The
+    /// other elements become meaningless. Returns `None` and changes nothing if `count` is 0 or above the
+    /// number of candidates.
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let length = self.candidates.capacity();

@@ -1,9 +1,9 @@
-//! The k nearest photons in a stream of candidates.
+//! Collector of the k nearest photons from a stream of candidates.
 //!
-//! A heap would be updated for every candidate. Instead, a buffer collects more than k candidates; when it is
-//! full, the k nearest are selected in linear time, and the search radius shrinks to the k-th distance. The
-//! result is a set, independent of the order of the stream: photon contents break ties between equal
-//! distances.
+//! A buffer collects more than k candidates. When it is full, the k nearest are selected in linear time, and
+//! the search radius shrinks to the k-th distance. This is cheaper than a heap, which every candidate would
+//! update. The resulting set does not depend on the order of the stream, because photon contents break ties
+//! between equal distances.
 
 use photoncard_shared::budget::selected_candidates;
 
@@ -12,7 +12,7 @@ use super::collector::{Collector, Lanes};
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
-/// Factor of the squared radius when a search is repeated with a larger radius.
+/// Factor by which the squared radius grows when a search is repeated.
 const WIDER: f32 = 3.0;
 
 /// The nearest photons found so far, in a borrowed buffer.
@@ -20,7 +20,7 @@ pub struct NearestPhotons<'a> {
     candidates: Candidates<'a>,
     length: usize,
     neighbors: usize,
-    /// Number of candidates at which a selection drops all but the nearest.
+    /// Number of candidates at which all but the k nearest are dropped.
     full: usize,
     limit: f32,
     /// Squared search radius without narrowing, m^2.
@@ -36,9 +36,9 @@ pub struct NearestPhotons<'a> {
 }
 
 impl<'a> NearestPhotons<'a> {
-    /// Creates an empty set for the `neighbors` nearest photons within `max_distance`, metres. The buffer
-    /// should have room for [`photoncard_shared::budget::gather_candidates`]; `neighbors` is limited to its
-    /// capacity less [`LANES`] + 1.
+    /// Creates an empty set for the k = `neighbors` nearest photons within `max_distance`, metres. The
+    /// capacity of `candidates` should be [`photoncard_shared::budget::gather_candidates`]. k is limited to
+    /// the capacity less [`LANES`] + 1.
     pub fn new(candidates: Candidates<'a>, neighbors: u32, max_distance: f32) -> Self {
         let room = candidates.capacity().saturating_sub(LANES);
         let neighbors = (neighbors as usize).clamp(1, room.saturating_sub(1).max(1));
@@ -60,15 +60,15 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Limits the squared search radius to `limit`, m^2, because no photons beyond it are accepted. Must be
+    /// Limits the squared search radius to `limit`, m^2, beyond which the search accepts no photons. Must be
     /// called before candidates are added. [`Self::max_distance_squared`] does not change.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
         self.limit = if self.widest < self.limit { self.widest } else { self.limit };
     }
 
-    /// Narrows the squared search radius to `limit`, m^2, because there are most likely k photons within it.
-    /// Has no effect after the first call, or after candidates were added.
+    /// Narrows the squared search radius to `limit`, m^2, an estimate of a radius that contains k photons.
+    /// Only the first call has an effect, and only before candidates are added.
     #[inline(always)]
     pub(super) fn narrow_to(&mut self, limit: f32) {
         // False for NaN.
@@ -78,8 +78,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Drops all candidates and enlarges the search radius if a narrowed search has found fewer than k
-    /// photons. Returns whether it did so; the search must then be repeated.
+    /// If a narrowed search has found fewer than k photons, drops all candidates, enlarges the search radius
+    /// and returns true. The search must then be repeated.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
@@ -123,13 +123,13 @@ impl<'a> NearestPhotons<'a> {
         self.length = self.neighbors;
     }
 
-    /// Ends the search: only the nearest photons remain, unordered.
+    /// Ends the search: drops all candidates but the k nearest, which are unordered.
     #[inline(always)]
     pub(super) fn finish(&mut self, isa: impl Isa) {
         self.select(isa);
     }
 
-    /// Bits of the squared distances of all candidates, and their contents.
+    /// Squared distances of all candidates, as bits, and their contents.
     #[inline(always)]
     pub(super) fn columns(&self) -> (&[u32], &[u64]) {
         let Candidates { distances, contents } = &self.candidates;
@@ -154,24 +154,24 @@ impl<'a> NearestPhotons<'a> {
         self.length == 0
     }
 
-    /// Number of candidates added so far.
+    /// Number of candidates added so far, dropped ones included.
     pub fn taken(&self) -> u32 {
         self.dropped + self.length as u32
     }
 
-    /// Number of candidates read by selections so far, and number of comparisons of their distances.
+    /// Number of candidates read by selections so far, and number of comparisons of distances.
     pub fn selections(&self) -> [u32; 2] {
         [self.selected, self.compared]
     }
 
-    /// Returns true if there are at least k candidates, where k is the number of photons to find.
+    /// Returns true if there are at least k candidates.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.length >= self.neighbors
     }
 
-    /// Distance of the k-th photon after the end of the search, metres; the maximum distance if there are
-    /// fewer than k.
+    /// Distance of the k-th nearest photon, metres, after the end of the search; the maximum distance if
+    /// there are fewer than k photons.
     pub fn radius(&self) -> f32 {
         let (distances, _) = self.columns();
         let farthest = distances.iter().copied().max().filter(|_| self.is_full());
@@ -202,7 +202,7 @@ impl Collector for NearestPhotons<'_> {
         // No overflow: the bits of infinity are below `u32::MAX`.
         let mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
         let Candidates { distances: all_distances, contents: all_contents } = &mut self.candidates;
-        // There is room: the buffer holds LANES candidates more than trigger a selection.
+        // There is room: a selection starts while LANES elements are free.
         let free = all_distances.get_mut(self.length..).and_then(<[u32]>::first_chunk_mut);
         let Some(free) = free else { return };
         isa.pack(mask, distances, free);

@@ -1,19 +1,19 @@
-//! Radiance that the nearest photons reflect: the density estimate of Jensen 2001, chapter 7, with three
+//! Density estimate of the radiance that the nearest photons reflect (Jensen 2001, chapter 7), with three
 //! corrections.
 //!
-//! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`:
+//! `L = 1 / (pi r^2 c) sum f(incoming) power`, summed over the photons within `r`:
 //!
-//! - The distance r to the k-th photon is a stopping rule. With all k photons in the sum the estimate would
-//!   be too bright by `k / (k - 1)`. The sum therefore has the k - 1 photons within r, the unbiased estimate
-//!   of a Poisson density. If fewer than k photons lie within the maximum distance, the sum has all of them,
-//!   and r is that distance.
-//! - Photons of another surface are excluded by their normals: photons on the other side of a thin wall, and
-//!   on the adjacent wall of a corner.
-//! - `c` is the area of the surface whose photons are in the sum, divided by the disc's area. Without `c`,
-//!   edges and corners would darken, and stacked surfaces would be too bright. The host measures `c` for each
-//!   photon, within about the photon's distance to its k-th neighbour. A gather uses the `c` of the nearest
-//!   photon of its surface, at a distance of about `r / sqrt(k)`, over which `c` hardly changes. Where walls
-//!   hide photons, area and photons are those of the region that the point sees ([`super::region`]).
+//! - `r` is the distance of the k-th photon. A sum over all k photons would be too bright by the factor
+//!   `k / (k - 1)`. The sum is therefore over the k - 1 nearer photons, which is the unbiased estimate of a
+//!   Poisson density. If fewer than k photons lie within the maximum distance, the sum is over all of them,
+//!   and `r` is the maximum distance.
+//! - Photons of other surfaces are excluded by their normals, such as those on the other side of a thin wall
+//!   or on the adjacent wall of a corner.
+//! - `c`, the disc fraction, is the area of the surface whose photons are in the sum, divided by the disc's
+//!   area `pi r^2`. Without `c`, edges and corners would darken, and stacked surfaces would be too bright.
+//!   The host measures `c` for each photon, within about its distance to its k-th neighbour. A gather uses
+//!   the `c` of the nearest photon of its surface. Where walls hide photons, area and photons are those of
+//!   the visible region ([`super::region`]).
 //!
 //! The remaining bias is blur: the radiance is a mean over the disc.
 
@@ -28,20 +28,20 @@ use crate::scene::{DecodedLobe, PartialReflection};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, min};
 
-/// Minimum squared radius of a disc in squared cells of the photon grid: that of a disc with the area of a
-/// cell's face, from which photons are rounded to a single point.
+/// Minimum squared radius of a disc, in units of the squared side of a photon grid cell. The disc then has
+/// the area of a cell's face: all photons in a cell are rounded to one point.
 const MIN_RADIUS_SQUARED: f32 = 1.0 / PI;
 
-/// Light that photons bring to a point.
+/// Result of a density estimate at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflected {
-    /// Reflected radiance, in the unit to which the partial reflection converts photon power units/m^2.
+    /// Reflected radiance, photon power units/(sr m^2), times the weight in the `PartialReflection`.
     pub radiance: Vec3,
     /// Number of photon normals decoded.
     pub normals_decoded: u32,
-    /// The closest photon of the point's surface.
+    /// Closest photon of the point's surface; `None` if no photon is in the sum.
     pub closest: Option<Candidate>,
-    /// Visibility of the photons from the point, as the disc fraction of the closest photon tells it.
+    /// Visibility of the photons from the point, according to the disc fraction of the closest photon.
     pub sight: Sight,
 }
 
@@ -56,13 +56,13 @@ pub enum Sight {
     Unknown,
 }
 
-/// Maximum area of the disc up to the closest photon, divided by the mean area per photon. Beyond it the
-/// photon's disc fraction does not represent the point's. On a wall, one gather in 1,100 has its closest
-/// photon farther away.
+/// Maximum area of the disc up to the closest photon, divided by the mean area per photon. If the photon is
+/// farther away, its disc fraction does not represent the point's. On a wall, this happens in one gather of
+/// 1,100.
 const APART: f32 = 7.0;
 
-/// Radiance of a gather: the reflected power of the photons, divided by the area of their disc or of the
-/// visible region that was searched. `cell` is the side of a cell of the photon grid, metres.
+/// Density estimate from the photons of a finished search: their reflected power, divided by the area of
+/// their disc or of `region`, if given. `cell` is the side of a cell of the photon grid, metres.
 #[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
@@ -127,8 +127,8 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// Candidate with the distance that `choose` prefers to all others; among equal distances, the candidate that
-/// `is_better` prefers.
+/// Closest or farthest candidate. `choose` is the minimum or the maximum of two distances. Among candidates
+/// at that distance, `is_better` decides.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,
@@ -149,8 +149,8 @@ fn extreme(
     best
 }
 
-/// Closest photon of the surface, and the sums over the surface's photons, both without `farthest` if given;
-/// `None` if no photon is left.
+/// Sums over the photons of the surface, except `farthest`. Returns the closest of these photons and the
+/// sums; `None` if there is no such photon.
 #[inline(always)]
 fn sum<'a>(
     nearest: &NearestPhotons,
@@ -189,7 +189,7 @@ fn sum<'a>(
     Some((closest?, sums))
 }
 
-/// Returns true if every photon has a normal with this code.
+/// Returns true if the normals of all photons have the code `normal`.
 #[inline(always)]
 fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     let differ =
@@ -197,10 +197,10 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     differ & 0xff << NORMAL_SHIFT == 0
 }
 
-/// Number of the lowest bit of the normal's code in a photon's content.
+/// Position of the lowest bit of the normal's code in a photon's content.
 const NORMAL_SHIFT: u32 = 50;
 
-/// Sum of the photons' power, and sum of power times [`PartialReflection::lobe_factor`].
+/// Sum of the photons' power (`power`), and of power times [`PartialReflection::lobe_factor`] (`lobe`).
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,

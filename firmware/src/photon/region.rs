@@ -1,16 +1,15 @@
-//! Visible region: the part of a gather's sphere that its point sees, used where walls hide photons from the
-//! point.
+//! Visible region: the part of a gather's sphere that is visible from the gather's point. It replaces the
+//! sphere where walls hide photons from the point.
 //!
 //! A density estimate over a sphere would count photons in the next room, or behind a thin wall that stands
-//! on the surface. Rays along the surface, a little above it, measure the free distance in sixteen
-//! directions. They divide the disc into sectors. Each sector ends before the straight line between the ends
-//! of its two border rays, so that it contains no photon behind a plane wall. The area of the estimate is
-//! that of the sectors, so that it agrees with the photons that are counted, whatever the rays have hit.
+//! on the surface. Sixteen rays along the surface, a little above it, measure the free distance in as many
+//! directions, and divide the disc into sectors. A sector ends before the straight line between the ends of
+//! its two border rays, so that it contains no photon behind a plane wall. The density estimate divides by
+//! the area of the sectors.
 //!
-//! Photons far off the tangent plane belong to other surfaces, such as the boards of a shelf. The region is
-//! therefore the part of the sphere outside a cone about the normal. It also ends below anything that covers
-//! the point: photons on the far side of a wall behind furniture have the same normal as the furniture's
-//! back.
+//! Photons far off the tangent plane belong to other surfaces, such as the boards of a shelf. The region
+//! therefore excludes a double cone about the normal. It also ends below any object that covers the point:
+//! behind furniture, photons on the far side of the wall have the same normal as the furniture's back.
 
 use core::f32::consts::PI;
 
@@ -27,46 +26,46 @@ use crate::vector::{max, max_component, min, tangents, unit};
 /// Number of sectors.
 pub const SECTORS: usize = BUNDLE_RAYS;
 
-/// Height of the rays above a surface that nothing covers closely, divided by the gather radius. Lower
-/// objects hide nothing.
+/// Height of the horizontal rays above the surface, divided by the gather radius, if nothing covers the point
+/// closely. Lower objects hide nothing.
 const HEIGHT: f32 = 0.03;
-/// Distance from the surface at which the vertical rays begin, divided by the gather radius. A cell of the
-/// photon grid is added to it.
+/// Distance from the surface at which the vertical rays start, divided by the gather radius. The side of a
+/// cell of the photon grid is added to the product.
 const LIFT: f32 = 1e-3;
-/// Maximum tangent of the angle between the surface and the direction to a photon.
+/// Maximum slope, against the tangent plane, of the direction to a photon of the region.
 const MAX_SLOPE: f32 = 0.4;
-/// Radius of a sector divided by the shorter length of its border rays: the cosine of half its angle, less
-/// half a percent for rounding.
+/// Radius of a sector, divided by the length of the shorter of its two border rays: the cosine of half the
+/// sector's angle, less half a percent for rounding.
 const WITHIN: f32 = 0.976;
-/// Radius of a sector that contains everything that may be visible, divided by the longer length of its
-/// border rays.
+/// Radius of a sector of `VisibleRegion::outer`, divided by the length of the longer of its two border
+/// rays.
 const BEYOND: f32 = 1.02;
-/// Height of the region, divided by the distance of the object that covers the point.
+/// Height of the region, divided by the distance of an object that covers the point.
 const BELOW: f32 = 0.9;
 const TAN_PI_8: f32 = 0.414_213_57;
 /// Cosines of the multiples of `pi / 8` up to `pi / 2`.
 const COSINES: [f32; 5] = [1.0, 0.923_879_5, 0.707_106_77, 0.382_683_43, 0.0];
 
-/// Region around a point in sixteen sectors of the tangent plane, with a maximum distance from the plane.
+/// Region around a point: sixteen sectors of the tangent plane, with a maximum distance from the plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Sectors {
     /// Squared radius of each sector, m^2.
     limits: [f32; SECTORS],
-    /// Squared maximum distance of a point of the region from the tangent plane, at the centre, m^2.
+    /// Squared maximum distance from the tangent plane, m^2, at the region's centre.
     lift_squared: f32,
 }
 
-/// Sectors around a point, and their coordinate frame.
+/// Region that is visible from a point, and its coordinate frame.
 #[derive(Clone, Copy, Debug)]
 pub struct VisibleRegion {
     /// Two unit tangents and the unit normal.
     pub axes: [Vec3; 3],
-    /// Region of which every part is visible.
+    /// Region that lies within the visible part of the surface.
     pub sectors: Sectors,
-    /// Region that contains everything visible.
+    /// Larger region that contains the visible part of the surface.
     pub outer: Sectors,
-    /// Height just below the object that covers the point, metres. Photons above it are on the object's far
-    /// side.
+    /// Height above the surface, metres, just below the object that covers the point. Photons higher up are
+    /// on that object's far side.
     ceiling: f32,
 }
 
@@ -78,21 +77,21 @@ impl Sectors {
         Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
     }
 
-    /// Area, in the tangent plane, of the sectors' part within a radius whose square is `radius_squared`;
-    /// both in m^2, or in squares of the unit of [`Self::scaled`].
+    /// Area, in the tangent plane, of the part of the sectors within a radius. Area and `radius_squared` are
+    /// in m^2, or in squares of the unit given to [`Self::scaled`].
     pub fn area(&self, radius_squared: f32) -> f32 {
         let squares: f32 = self.limits.iter().map(|limit| min(*limit, radius_squared)).sum();
         squares * (PI / SECTORS as f32)
     }
 
-    /// Squared distance of the region's farthest point from its centre, m^2.
+    /// Upper bound of the squared distance of the region's points from its centre, m^2.
     pub(super) fn reach_squared(&self) -> f32 {
         let greatest = self.limits.iter().copied().fold(0.0, max);
         greatest * (1.0 + MAX_SLOPE * MAX_SLOPE) + self.lift_squared
     }
 
-    /// Sets `outside` to 1 for points outside the region, else to 0. Points are given by their coordinates
-    /// along the axes, from the region's centre.
+    /// Sets the lanes of `outside` to 1 for points outside the region, else to 0. Points are given by their
+    /// coordinates along the region's axes, relative to its centre.
     #[inline(always)]
     pub fn test(&self, isa: impl Isa, [u, v, w]: [&[f32; LANES]; 3], outside: &mut [u32; LANES]) {
         let mut indices = [0; LANES];
@@ -112,7 +111,7 @@ impl Sectors {
         }
     }
 
-    /// Returns true for a point in the region.
+    /// Returns true if a point, given as in `Self::test`, is in the region.
     #[inline(always)]
     fn holds(&self, [u, v, w]: [f32; 3]) -> bool {
         let across = u * u + v * v;
@@ -121,8 +120,8 @@ impl Sectors {
     }
 }
 
-/// Number of the sector that contains a direction. Bits 0 and 1 count the sectors of a quadrant from the
-/// first axis to the second; bits 2 and 3 are set for negative `u` and `v`.
+/// Number of the sector that contains the direction `(u, v)`. Bits 0 and 1 number the four sectors of a
+/// quadrant, from the `u` axis to the `v` axis. Bits 2 and 3 are set for negative `u` and `v`.
 #[inline(always)]
 fn sector(u: f32, v: f32) -> u32 {
     let (a, b) = (max(u, -u), max(v, -v));
@@ -130,7 +129,7 @@ fn sector(u: f32, v: f32) -> u32 {
     steps | u32::from(u < 0.0) << 2 | u32::from(v < 0.0) << 3
 }
 
-/// Numbers of the two rays at the borders of a sector. Rays are numbered by azimuth.
+/// Numbers of the two rays at the borders of a sector. Ray `i` has the azimuth `i pi / 8`.
 fn borders(sector: usize) -> [usize; 2] {
     let steps = sector % 4;
     let ray = |steps: usize| match sector / 4 {
@@ -142,7 +141,7 @@ fn borders(sector: usize) -> [usize; 2] {
     [ray(steps), ray(steps + 1)]
 }
 
-/// Cosine and sine of the azimuth of a ray, `ray pi / 8`.
+/// `[cosine, sine]` of the azimuth `ray pi / 8`.
 fn azimuth(ray: usize) -> [f32; 2] {
     let (quarter, steps) = (ray / 4, ray % 4);
     let [c, s] = [steps, 4 - steps].map(|steps| COSINES.get(steps).copied().unwrap_or(0.0));
@@ -155,8 +154,8 @@ fn azimuth(ray: usize) -> [f32; 2] {
 }
 
 impl VisibleRegion {
-    /// Region that a point sees on a surface whose normal has the code `normal`, within `reach` metres, for
-    /// gathers with a radius of about `radius`. The result depends on the scene, not on photons.
+    /// Finds the region visible from a point of a surface within `reach` metres, by tracing rays. Gathers
+    /// have a radius of about `radius`, metres. `normal` is the code of the surface normal.
     ///
     /// # Errors
     /// If the card image is invalid.
@@ -203,9 +202,9 @@ impl VisibleRegion {
         })
     }
 
-    /// Free height above the point `above`, metres, infinite if nothing is hit within `up`; and unit normal
-    /// of the surface below the point: that of the triangle hit within `down`, if it agrees with `coded`,
-    /// else `coded`.
+    /// Returns the free height above the point `above`, metres (infinite if nothing is hit within `up`), and
+    /// the unit normal of the surface below. This is the normal of the triangle hit within `down` if it
+    /// agrees with the decoded normal `coded`, else `coded`.
     fn clear_height(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -223,13 +222,13 @@ impl VisibleRegion {
     }
 }
 
-/// Distance from the surface, metres, at which the vertical rays begin for gathers of a radius.
+/// Distance from the surface, metres, at which the vertical rays start (`LIFT`).
 fn lift(scene: &SceneImage, radius: f32) -> f32 {
     LIFT * radius + scene.header.photon_grid.cell
 }
 
-/// Returns true if something covers a point so closely that a gather of radius `radius`, metres, may mistake
-/// the photons on it for the surface's. The code of the surface's normal is `normal`.
+/// Returns true if an object covers a point so closely that a gather of radius `radius`, metres, may include
+/// the object's photons. `normal` is the code of the surface normal.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -248,7 +247,7 @@ pub(super) fn is_covered(
     Ok(up.is_some())
 }
 
-/// Unit normal of a triangle on the side of `towards`; zero for a triangle without area.
+/// Unit normal of the hit triangle, on the side of `towards`; zero for a triangle without area.
 fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
     let (b, c) = (b - a, c - a);
@@ -258,13 +257,13 @@ fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
     if normal.dot(towards) < 0.0 { -normal } else { normal }
 }
 
-/// Criterion for the photons that a search accepts, by their positions.
+/// Test by which a search accepts or rejects photons by their positions.
 pub(super) trait Filter {
-    /// Sets the distance bits of photons that are not accepted to `u32::MAX`. `ways` are the vectors from the
-    /// photons to the query, by axis.
+    /// Sets the distances of rejected photons to `u32::MAX`. `ways` are the vectors from the photons to the
+    /// query, metres, by axis.
     fn filter(&self, isa: impl Isa, ways: [&[f32; LANES]; 3], distances: &mut [u32; LANES]);
 
-    /// Returns true if a photon is accepted. `way` is the vector from the photon to the query.
+    /// Returns true if a photon is accepted. `way` is the vector from the photon to the query, metres.
     fn takes(&self, way: [f32; 3]) -> bool;
 }
 

@@ -1,16 +1,16 @@
-//! Test by normals whether photons belong to one surface.
+//! Test, by the normals, whether a photon lies on a given surface.
 
 use glam::Vec3;
 use photoncard_shared::layout::{decode_normal, normal_class};
 
-/// Minimum cosine between the normals of a photon and of a surface at which the photon is taken to lie on the
-/// surface.
+/// Minimum cosine between a photon's normal and a surface's normal. Below it, the photon is assumed to lie on
+/// another surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// Number of codes of a normal.
+/// Number of one-byte codes of a normal.
 const CODES: usize = 256;
 
-/// Unit normal of each code.
+/// Unit normal of each one-byte code.
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static NORMALS: [Vec3; CODES] = {
     let mut normals = [Vec3::ZERO; CODES];
@@ -29,8 +29,8 @@ const fn computed_normal(code: u8) -> Vec3 {
     Vec3::new(x * inverse, y * inverse, z * inverse)
 }
 
-/// For each code of a normal, bit mask of the classes ([`normal_class`]) of all normals whose cosine to that
-/// normal is at least [`MIN_NORMAL_COSINE`].
+/// For each code of a surface's normal, a bit mask: the classes ([`normal_class`]) of all photon normals
+/// whose cosine to the surface's normal is at least [`MIN_NORMAL_COSINE`].
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];
@@ -52,7 +52,7 @@ pub(super) fn unit_normal(code: u8) -> Vec3 {
     NORMALS.get(usize::from(code)).copied().unwrap_or_default()
 }
 
-/// Square root of a number from 1/3 to 2, rounded correctly: Newton's method in twice the precision.
+/// Correctly rounded square root of a number from 1/3 to 2, by Newton's method in `f64`.
 const fn root(square: f32) -> f32 {
     let square = square as f64;
     let (mut root, mut step) = (1.0, 0);
@@ -63,8 +63,8 @@ const fn root(square: f32) -> f32 {
     root as f32
 }
 
-/// Test whether a photon belongs to a surface. Consecutive photons mostly have equal normals, so that the
-/// last result is cached.
+/// Test whether photons lie on a given surface. The last result is cached, because consecutive photons mostly
+/// have equal normals.
 pub struct SameSurface {
     normal: Vec3,
     /// Code of the last normal tested, and its cosine to `normal`.
@@ -81,8 +81,8 @@ impl SameSurface {
         Self { normal, last: (code, normal.dot(normal)), decoded: 0 }
     }
 
-    /// Set of the classes, one bit each, of all normals that [`Self::holds`] accepts for a surface whose
-    /// normal has this code.
+    /// Bit mask of the classes ([`normal_class`]) of all photon normals that [`Self::holds`] accepts for a
+    /// surface whose normal has this code.
     #[inline(always)]
     pub(super) fn classes(code: u8) -> u16 {
         CLASSES.get(usize::from(code)).copied().unwrap_or_default()
@@ -94,7 +94,7 @@ impl SameSurface {
         self.decoded
     }
 
-    /// Returns true if a photon whose normal has this code belongs to the surface.
+    /// Returns true if a photon whose normal has this code lies on the surface.
     #[inline(always)]
     pub fn holds(&mut self, code: u8) -> bool {
         self.cosine(code) >= MIN_NORMAL_COSINE

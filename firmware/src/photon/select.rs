@@ -1,20 +1,20 @@
-//! Selection of the k nearest candidates, in place and without panicking indices.
+//! Selection of the k nearest candidates, in place.
 //!
-//! On a surface the squared distance of the k-th photon is proportional to k. Interpolation therefore guesses
-//! an interval of distances that contains the k-th and few others; counting the candidates below its ends
-//! verifies and corrects the guess. One pass then keeps the candidates below the interval, and sets aside
-//! those in the interval, the nearest of which complete the k. If no guess succeeds, as with many candidates
-//! at one distance, quickselect (Hoare 1961) is used and, after a bounded number of pivots, a radix selection
-//! by bits of the sort key. All methods give equal sets.
+//! On a surface, the squared distance of the k-th photon is proportional to k. Interpolation therefore
+//! guesses an interval of squared distances that contains the k-th and few others. Counting the candidates
+//! below its ends verifies and corrects the guess. One pass then keeps the candidates below the interval and
+//! sets aside those within it, of which the nearest complete the k. If no guess succeeds, for example with
+//! many equal distances, quickselect (Hoare 1961) is used. After a bounded number of pivots it gives way to a
+//! radix selection by bits of the sort key. All methods select the same set.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
 
 /// Maximum number of guesses of an interval.
 const GUESSES: u32 = 4;
-/// Maximum number of candidates in an interval.
+/// Maximum number of candidates in a successful guess.
 const BETWEEN: usize = 32;
-/// Maximum number of quickselect's pivots before the radix selection begins.
+/// Maximum number of pivots in quickselect before the radix selection starts.
 const PIVOTS: u32 = 16;
 /// Maximum number of candidates sorted by insertion.
 const FEW: usize = 16;
@@ -23,13 +23,13 @@ const FEW: usize = 16;
 pub(super) struct Chosen {
     /// The farthest candidate that was selected.
     pub(super) last: Candidate,
-    /// Number of comparisons of distances, without those of quickselect and those between equal distances.
+    /// Number of comparisons of distances; those of quickselect and between equal distances do not count.
     pub(super) compared: u32,
 }
 
 /// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the
-/// farthest of them. All other elements, including those past `length`, are then meaningless. Returns `None`,
-/// and changes nothing, if `count` is 0 or above `length`.
+/// farthest of these. All other elements, including those past `length`, become meaningless. Returns `None`
+/// and changes nothing if `count` is 0 or above `length`.
 #[inline(always)]
 pub(super) fn select(
     isa: impl Isa,
@@ -49,17 +49,17 @@ pub(super) fn select(
     Some(Chosen { last, compared: comparisons(length, guesses + 1, between) })
 }
 
-/// Number of comparisons of a selection. Every distance is compared with the greatest so far and, in each
-/// pass, with both ends of the interval. Every candidate in the interval is compared with [`BETWEEN`] others
-/// and with the k-th one.
+/// Number of comparisons of a selection. Each of the `length` distances is compared once to find the
+/// greatest, and with both ends of an interval in each of `passes` passes. Each of the `between` candidates
+/// in the interval is compared with [`BETWEEN`] others and with the k-th.
 #[inline(always)]
 fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
     length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
 }
 
-/// Guesses an interval `low <= d < high` of squared distances, as bits, that contains the `count`-th distance
-/// and at most [`BETWEEN`] distances in all. Returns the interval, `None` if [`GUESSES`] guesses find none,
-/// and the number of guesses.
+/// Finds an interval `low <= d < high` of squared distances, as bits, that contains the `count`-th distance
+/// and at most [`BETWEEN`] distances in all. Returns the interval (`None` if [`GUESSES`] guesses fail) and
+/// the number of guesses. Returns `None` as a whole if there are no distances.
 #[inline(always)]
 fn guess(distances: &[u32], count: usize) -> Option<(Option<[u32; 2]>, u32)> {
     let farthest = distances.iter().copied().max()?;
@@ -97,8 +97,8 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// Does [`select`] with an interval of squared distances from [`guess`]. Returns the farthest selected
-/// candidate, and the number of candidates in the interval.
+/// Does [`select`] by means of an interval that [`guess`] has found. Returns the farthest selected candidate,
+/// and the number of candidates in the interval.
 #[inline(always)]
 fn keep(
     isa: impl Isa,
@@ -141,13 +141,13 @@ fn keep(
     Some((last, between))
 }
 
-/// Mask of the first `count` lanes, at least one; of all lanes if `count` is above [`LANES`].
+/// Bit mask of the first `count` lanes; of all lanes if `count` is above [`LANES`]. `count` must not be 0.
 #[inline(always)]
 fn first_lanes(count: usize) -> u32 {
     u32::MAX >> (u32::BITS - count.min(LANES) as u32)
 }
 
-/// Candidates in the interval, set aside, with room for [`LANES`] more because whole vectors are written.
+/// Buffer of the candidates in the interval. It has [`LANES`] spare elements for writes of whole vectors.
 struct Aside {
     distances: [u32; BETWEEN + LANES],
     contents: [u64; BETWEEN + LANES],
@@ -196,8 +196,8 @@ impl Aside {
         Some(last)
     }
 
-    /// Index of the candidate with exactly `rank` nearer candidates; `None` if it shares its distance with
-    /// another candidate.
+    /// Index of the candidate with exactly `rank` nearer candidates; `None` if another candidate has the same
+    /// distance.
     #[inline(always)]
     fn only_one_at(&self, rank: usize) -> Option<usize> {
         let all: &[u32; BETWEEN] = self.distances.first_chunk()?;
@@ -238,14 +238,14 @@ fn part(mut cells: CandidateCells, mut rank: usize) -> Option<Candidate> {
     cells.get(rank)
 }
 
-/// Side of a partition that contains rank `rank`, and the rank within that side. The first side has `less`
-/// cells.
+/// Splits partitioned candidates after the first `less`. Returns the half that contains the candidate of rank
+/// `rank`, and its rank within the half.
 fn follow(cells: CandidateCells, rank: usize, less: usize) -> Option<(CandidateCells, usize)> {
     let (front, back) = cells.split_at(less)?;
     Some(if rank < less { (front, rank) } else { (back, rank - less) })
 }
 
-/// Partitions the candidates: moves those for which `is_first` is true to the front. Returns their number.
+/// Moves the candidates for which `is_first` is true to the front. Returns their number.
 #[inline(always)]
 fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize {
     let mut count = 0;
@@ -260,7 +260,7 @@ fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize
     count
 }
 
-/// Median of three medians of three.
+/// Pivot for quickselect: the median of three medians of three candidates.
 fn pivot(cells: CandidateCells) -> Option<Candidate> {
     let at = |ninth: usize| cells.get(cells.len() * ninth / 9);
     let of_three = |ninth| Some(median(at(ninth)?, at(ninth + 1)?, at(ninth + 2)?));
@@ -275,7 +275,7 @@ fn median(a: Candidate, b: Candidate, c: Candidate) -> Candidate {
     }
 }
 
-/// Sorts by insertion. Returns the candidate of rank `rank`.
+/// Sorts the candidates by insertion. Returns the one of rank `rank`, counted from 0.
 fn sort(cells: CandidateCells, rank: usize) -> Option<Candidate> {
     for sorted in 1..cells.len() {
         let candidate = cells.get(sorted)?;

@@ -11,7 +11,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::photon::{CausticSearch, LitBy, reflected_caustics};
 use crate::scene::{PartialReflection, Reflection, Reflector};
 
-/// Radiance that a point reflects of caustics, in the card image's radiance units.
+/// Radiance of caustics that a gather point reflects, in the card image's radiance units.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -55,8 +55,8 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
 }
 
 /// Part of a reflection that the caustic map lights, and the photons that light the lobe. With gather rays, a
-/// narrow lobe takes from the map at most the light of lights without an area, as its gather rays find the
-/// other lights.
+/// narrow lobe takes from the map at most the light of point, spot and distant lights: its gather rays find
+/// the other lights.
 fn lit(reflection: &Reflection, gather_rays: u32) -> (Reflection, LitBy) {
     if gather_rays == 0 || !reflection.has_narrow_lobe() {
         (*reflection, LitBy::All)

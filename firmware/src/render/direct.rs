@@ -2,16 +2,16 @@
 //! rays that hit a light.
 //!
 //! Shadow rays are noisy near an emitter, as their contribution grows with the inverse square of the
-//! distance; gather rays are noisy where the emitter is small. Gather rays are cast in any case, so that both
+//! distance; gather rays are noisy where the emitter is small. Gather rays are cast in any case, and both
 //! techniques are combined by the balance heuristic (Veach, Guibas 1995). With `n` rays of density `p` in one
 //! technique and `m` rays of density `q` in the other, a path has the weight `n p / (n p + m q)` in the
 //! first. The two weights of a path add up to 1, so that direct light is counted once.
 //!
-//! Emission that rays of an irradiance record hit is interpolated for the samples around the record; the
-//! samples' shadow rays add the remainder. Rays of both kinds must compute equal weights. The record's
-//! density is therefore replaced by `cos(theta) / pi`, because samples do not know its direction table, and
-//! the number of shadow rays is that of all planned samples of a pixel. The power heuristic leaves small
-//! emitters, which would make a record noisy, to shadow rays, and a sky to records.
+//! Emission that the rays of an irradiance record hit is interpolated for the samples around the record; the
+//! samples' shadow rays add the remainder. Record and samples must agree on the weights. The weights
+//! therefore assume the density `cos(theta) / pi` for the record's rays, because samples do not know its
+//! direction table, and the shadow rays of all planned samples of a pixel. Here the power heuristic is used:
+//! it leaves small emitters, which would make a record noisy, to shadow rays, and a sky to records.
 //!
 //! No gather ray hits point, spot and distant lights, so that only shadow rays contribute their light.
 //!
@@ -38,8 +38,8 @@ use crate::scene::light::{
 use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
 use crate::vector::max_component;
 
-/// Radiance that a point reflects of direct light: the estimate of its shadow rays, weighted against gather
-/// rays, W/(sr m^2).
+/// Direct light that a gather point reflects, W/(sr m^2), estimated by shadow rays and weighted against
+/// gather rays.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -118,7 +118,8 @@ impl ShadowRays {
     }
 }
 
-/// Radiance that a point reflects of an unoccluded light sample, weighted against gather rays, W/(sr m^2).
+/// Radiance of an unoccluded light sample that a gather point reflects, weighted against gather rays,
+/// W/(sr m^2).
 fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
     let LightSample { direction, irradiance, density, .. } = *light;

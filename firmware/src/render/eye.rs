@@ -12,8 +12,8 @@ use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// Position of a path in the picture, pixels from the upper left corner. The paths of a pixel are stratified
-/// over the pixel filter, which can extend beyond the pixel and the picture.
+/// Position of a path's eye ray in the picture, pixels from the upper left corner. The paths of a pixel are
+/// stratified over the pixel filter, which can extend beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, .. } = pixel;
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);

@@ -14,11 +14,11 @@ use crate::memory::MemoryPort;
 use crate::sampler::Dimension;
 use crate::scene::{Ray, ReflectedDirection, Surface, closest_hit, read_surface};
 
-/// Minimum of a sharp lobe's fraction of its surface's albedo at which the features are those of the surface
-/// that the lobe reflects.
+/// Minimum fraction of a surface's albedo that belongs to its sharp lobe, for the features to be those of the
+/// surface that the lobe reflects.
 const MIN_SHARP_SHARE: f32 = 0.75;
 
-/// Features of a sample.
+/// Albedo and normal that a sample shows, which guide a denoiser.
 #[derive(Clone, Copy, Debug)]
 pub struct Features {
     /// Albedo, multiplied by the throughput of the path from the eye. It can exceed 1.

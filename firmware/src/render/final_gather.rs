@@ -29,22 +29,22 @@ pub struct GatherRayEnd {
     pub cell: u8,
     /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units.
     pub direct: Vec3,
-    /// Gather of the reflected light at the end of the ray; `None` at a black surface.
+    /// Request for the photon gather at the end of the ray; `None` if no reflecting surface is there.
     pub request: Option<GatherRequest>,
 }
 
 /// Contributions of the rays of a bundle.
 pub type GatherRayEnds = Vec<GatherRayEnd, BUNDLE_RAYS>;
 
-/// Divides a range of rays into parts of at most [`BUNDLE_RAYS`] rays, for one [`cast`] each.
+/// Divides a range of rays into bundles of at most [`BUNDLE_RAYS`] rays. [`cast`] casts one bundle.
 pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     let Range { start, end } = rays;
     (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
 }
 
 /// Casts at most [`BUNDLE_RAYS`] rays of a gather point and stores their contributions in `ends`. Rays that
-/// hit neither a surface nor the environment have no contribution. A contribution is a term of the mean over
-/// the point's rays. `target` is the sum to which the gathers' results are to be added.
+/// hit neither a surface nor the environment have no contribution. Each contribution is already divided by
+/// the number of the point's rays. `target` is the sum to which the gathers' results are to be added.
 ///
 /// # Errors
 /// If the card image is invalid, or there are more than [`BUNDLE_RAYS`] rays.
@@ -132,7 +132,8 @@ fn arrive<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
 }
 
-/// Light of the environment where a gather ray leaves the scene; `None` without an environment.
+/// Contribution of a gather ray that leaves the scene: light of the environment, and light collected on the
+/// path. `None` if there is neither.
 #[inline(never)]
 fn escaped<M: MemoryPort>(
     context: &mut Context<M>,
@@ -174,9 +175,9 @@ fn collected<M>(
         * (1.0 / context.scene.header.radiance_unit)
 }
 
-/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes, not only flat
-/// glass. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is the
-/// narrow lobe's part of `weight`, because the caustic map lights all other reflection.
+/// Weight of emission at the end of a gather ray that passed more than flat glass: specular surfaces or
+/// narrow lobes. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is
+/// the narrow lobe's part of `weight`, because the caustic map lights all other reflection.
 fn beyond_specular<M>(
     context: &Context<M>,
     point: &GatherPoint,

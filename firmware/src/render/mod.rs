@@ -26,7 +26,7 @@ const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Arguments of every pass: scene, memory, frame parameters and counters.
 pub struct Context<'a, M> {
-    /// Sections of the card image.
+    /// Scene data in card memory (card image).
     pub scene: &'a SceneImage,
     /// Card memory.
     pub memory: &'a mut M,
@@ -38,7 +38,7 @@ pub struct Context<'a, M> {
 
 /// Arguments of a chip's work that are common to all of its tiles.
 pub struct RenderJob<'a, M> {
-    /// Sections of the card image.
+    /// Scene data in card memory (card image).
     pub scene: &'a SceneImage,
     /// Card memory.
     pub memory: &'a mut M,
@@ -49,7 +49,7 @@ pub struct RenderJob<'a, M> {
 }
 
 impl<M> RenderJob<'_, M> {
-    /// Arguments for a pass of a tile with these counters.
+    /// Arguments for a pass of the tile to which `counters` belong.
     #[inline(always)]
     pub fn context<'b>(&'b mut self, counters: &'b mut Counters) -> Context<'b, M> {
         Context { scene: self.scene, memory: self.memory, frame: self.frame, counters }
@@ -81,8 +81,8 @@ pub struct PixelSample {
     pub x: u32,
     /// Row of the pixel in the whole picture.
     pub y: u32,
-    /// Index of the path in the pixel: that of the sample, unless samples have several paths (adaptive
-    /// sampling).
+    /// Index of the path in the pixel. It equals the index of the sample unless samples have several paths
+    /// (adaptive sampling).
     pub sample: u32,
 }
 

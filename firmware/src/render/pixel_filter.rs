@@ -26,8 +26,8 @@ const BLACKMAN_HARRIS: Quantiles = [
     0.439136, 0.75,
 ];
 
-/// Position of a sample on one axis, drawn by a random number in [0, 1): pixels from the left or upper border
-/// of the sample's pixel.
+/// Position of a sample along one axis, pixels from the left or upper border of its pixel. `number` is a
+/// random number in [0, 1).
 #[inline(always)]
 pub(super) fn place(filter: Filter, number: f32) -> f32 {
     match filter {
@@ -37,7 +37,7 @@ pub(super) fn place(filter: Filter, number: f32) -> f32 {
     }
 }
 
-/// Offset from the pixel's centre, interpolated linearly between the quantiles.
+/// Offset from the pixel's centre, pixels, interpolated linearly between the quantiles.
 fn offset(quantiles: &Quantiles, number: f32) -> f32 {
     let signed = 2.0 * number - 1.0;
     let at = min(signed.abs() * STEPS as f32, STEPS as f32);

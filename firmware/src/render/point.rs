@@ -11,7 +11,7 @@ use crate::photon::{Candidates, NearestPhotons, PhotonMap};
 use crate::sampler::Pattern;
 use crate::scene::{Reflector, Surface};
 
-/// Origin of final gather rays.
+/// Surface point from which final gather rays are cast, and the parameters of these rays.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
     /// Surface at the point, with its whole reflection, whatever the purpose of the rays.
@@ -40,13 +40,14 @@ pub enum Purpose {
     Record,
 }
 
-/// Minimum number of gather rays of a point whose direction table depends on photons. The search for photons
-/// costs as much as a gather ray, and fewer rays are too thinly spread over the cells to profit
-/// (`docs/techniques.md`).
+/// Minimum number of gather rays for a direction table that depends on photons. With fewer rays such a table
+/// does not pay: its photon search costs as much as a gather ray, and the rays are spread too thinly over the
+/// cells (`docs/techniques.md`).
 const MIN_RAYS_OF_SEARCH: u32 = 8;
 
 impl GatherPoint {
-    /// Creates the point of a sample, with `rays` rays for all reflected light; none if the surface is black.
+    /// Creates the gather point of a sample with `rays` rays for all reflected light. A black surface gets no
+    /// rays.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = if surface.reflection.is_black() { 0 } else { rays };
         Self {
@@ -59,7 +60,7 @@ impl GatherPoint {
         }
     }
 
-    /// Creates the point of an irradiance record. `surface` must be white.
+    /// Creates the gather point of an irradiance record. `surface` must be white.
     pub fn record(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         Self {
             surface,
@@ -71,8 +72,8 @@ impl GatherPoint {
         }
     }
 
-    /// Creates the point of a sample with rays for the lobe alone: [`Reflector::lobe_share`] times `rays`,
-    /// rounded up.
+    /// Creates the gather point of a sample with rays for the lobe alone. Their number is `rays` times
+    /// [`Reflector::lobe_share`], rounded up.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
         Self {
@@ -96,8 +97,8 @@ impl GatherPoint {
         Reflector { reflection, ..reflector }
     }
 
-    /// Sets the direction table: that of the reflection for few rays, else that of the frame's sampling
-    /// method, which may search for the nearest photons.
+    /// Chooses the direction table. With few rays it depends on the reflection alone, otherwise on the
+    /// frame's sampling method, which may need a search for the nearest photons.
     ///
     /// # Errors
     /// If the card image is invalid.

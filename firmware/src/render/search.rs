@@ -9,8 +9,8 @@ use crate::memory::MemoryPort;
 use crate::photon::{NearestPhotons, PhotonMap, Reflected, gather};
 use crate::scene::PartialReflection;
 
-/// Counts the photons found by a gather whose reflection has a lobe, and the photon normals that were
-/// decoded.
+/// Counts the photon normals that a gather decoded and, if the reflection has a lobe, the photons that it
+/// found.
 #[inline(always)]
 pub(super) fn count_reflection(
     counters: &mut Counters,

@@ -2,10 +2,10 @@
 //! narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]) are specular too.
 //!
 //! At a specular surface a path takes one continuation at random, in proportion to the continuation's share
-//! of the light: reflection, transmission, a direction of the narrow lobe, or an end at the surface for the
-//! rest of the surface's reflection. The samples of a pixel cover all continuations. After [`FREE_BOUNCES`]
-//! bounces a path survives with the probability of its throughput (Russian roulette), and after
-//! [`SPECULAR_BOUNCES`] it contributes nothing.
+//! of the light: reflection, transmission, a direction in the narrow lobe, or the end of the path, which
+//! stands for the rest of the surface's reflection. The samples of a pixel cover all continuations. After
+//! [`FREE_BOUNCES`] bounces a path survives with probability `min(1, throughput)` (Russian roulette), and
+//! after [`SPECULAR_BOUNCES`] it contributes nothing.
 //!
 //! Absorption follows the Beer-Lambert law, with the coefficient of the glass that the path entered last;
 //! nested glass is not tracked. Flat glass changes neither direction nor medium.
@@ -23,8 +23,8 @@ use crate::scene::{
 };
 use crate::vector::{max, max_component, min};
 
-/// Minimum of the probability that a path ends at a surface, divided by the probability that it continues, if
-/// the surface's reflection is not black.
+/// Minimum of `p / (1 - p)` at a surface whose reflection is not black, where `p` is the probability that a
+/// path ends there.
 const MIN_STAY: f32 = 1.0 / 16.0;
 
 /// A path through specular surfaces, up to its current ray.
@@ -34,8 +34,8 @@ pub struct SpecularPath {
     pub ray: Ray,
     /// Throughput between the path's origin and the current ray, dimensionless.
     pub throughput: Vec3,
-    /// Light of point, spot and distant lights, which no ray can hit, that narrow lobes on the path reflect
-    /// towards the path's origin, W/(sr m^2).
+    /// Light of point, spot and distant lights that narrow lobes on the path reflect towards the path's
+    /// origin, W/(sr m^2). No ray can hit these lights.
     pub collected: Vec3,
     /// Number of specular surfaces that the path has passed.
     pub bounces: u32,
@@ -71,7 +71,7 @@ pub enum Passes {
     /// Perfectly specular surfaces and narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]). Used for
     /// gather rays and photons.
     NarrowLobes,
-    /// As [`Self::NarrowLobes`], but the path can end at narrow lobes that the caustic map lights
+    /// Same as [`Self::NarrowLobes`], but the path can end at narrow lobes that the caustic map lights
     /// ([`crate::scene::Reflection::keeps_caustics`]). Used for photons of the caustic map.
     CausticPhotons,
 }
@@ -132,10 +132,10 @@ impl SpecularPath {
     }
 
     /// Continues or ends the path at a surface. The first of the three numbers in `random`, in [0, 1),
-    /// chooses the continuation, the others the direction in a lobe. A lobe that the path passes is removed
-    /// from the surface, for the case that the path ends there. If a photon continues in a direction sampled
-    /// from a lobe, the surface's `outgoing` becomes the direction that the photon is taken to come from
-    /// ([`Reflector::sample_photon`]).
+    /// chooses the continuation, the others the direction in a lobe. A narrow lobe that the path can pass is
+    /// removed from the surface's reflection, unless the path can also end at the lobe (`CausticPhotons`). If
+    /// a photon continues in a direction sampled from a lobe, the surface's `outgoing` becomes the direction
+    /// that the photon is taken to come from ([`Reflector::sample_photon`]).
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -299,13 +299,14 @@ impl Choice {
     }
 }
 
-/// Number, in a path, of random choice `choice` of [`read_surface`] at the surface after `bounces` bounces.
+/// Converts the number of a random choice in one call of [`read_surface`] to a number that is unique in the
+/// path. The call reads the surface after `bounces` bounces.
 pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Radiance that a surface's narrow lobe reflects of one light sample, W/(sr m^2); zero if the light has an
-/// area, because rays of the lobe hit such lights.
+/// Radiance of one light sample that a surface's narrow lobe reflects, W/(sr m^2). It is zero if the light
+/// has an area, because rays of the lobe hit such lights.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(
     context: &mut Context<M>,

@@ -1,10 +1,10 @@
-//! Bundles of rays. Up to sixteen rays traverse the hierarchy together, so that a line is fetched once for
-//! all rays that need it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each ray
-//! requests the line, so that the number of requests equals that of single rays; all requests but the first
-//! hit any cache.
+//! Bundles of rays: up to sixteen rays traverse the bounding volume hierarchy together, so that a line of
+//! memory is fetched once for all rays that need it (compare Barringer, Akenine-Möller 2014, *Dynamic ray
+//! stream traversal*). Each ray requests the line separately. The number of requests thus equals that of
+//! single rays, and every request but the first is a cache hit.
 //!
-//! Each ray is tested against boxes and triangles by the operations for a single ray ([`super::bvh`]), so
-//! that hits are equal bit for bit, whatever the other rays.
+//! Tests of boxes and triangles use the same operations as for a single ray ([`super::bvh`]). A ray's hit is
+//! therefore the same, bit for bit, in every bundle.
 
 use core::ops::ControlFlow;
 
@@ -24,13 +24,13 @@ use crate::wide_tree::{BEYOND, Descent, END_OF_GROUP, Order};
 /// Maximum number of rays of a bundle.
 pub const BUNDLE_RAYS: usize = LANES;
 
-/// Mask of the lower half of the 32 bits that are pushed with a child: one bit per ray of the bundle. The
-/// upper half of the 32 bits holds the upper half of the `f32` bits of the least distance at which a ray
-/// enters the child's box.
+/// Mask of the ray bits in the 32 bits that are pushed onto the stack with a child. The lower 16 bits are a
+/// set of rays, one bit per ray of the bundle. The upper 16 bits are the upper half of an `f32`: the least
+/// distance at which one of these rays enters the child's box.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
-/// Finds [`closest_hit`] for each of up to [`BUNDLE_RAYS`] rays and stores it in `hits`, which must be `None`
-/// before. The hits are written in place because they take a kilobyte.
+/// Finds the [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays. Hits are written into `hits`, which must
+/// hold `None` before; returning them would copy a kilobyte.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -50,7 +50,7 @@ pub fn closest_hits(
     }
 }
 
-/// Finds [`transmittance`] for each of up to [`BUNDLE_RAYS`] rays.
+/// Finds the [`transmittance`] along each of up to [`BUNDLE_RAYS`] rays.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -76,7 +76,7 @@ pub struct Bundle<'a, M, S> {
     pub memory: &'a mut M,
     /// Rays of the bundle, at most [`BUNDLE_RAYS`].
     pub rays: &'a [Ray],
-    /// Result of each ray, `None` or [`Passed::ALL`] at first.
+    /// Result of each ray. The caller sets each to `None` or [`Passed::ALL`] at first.
     pub searches: &'a mut [S; BUNDLE_RAYS],
 }
 
@@ -89,7 +89,7 @@ fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
     simd::run(bundle)
 }
 
-/// A ray of a bundle, prepared for tests of boxes and triangles.
+/// A ray of a bundle, with its data for tests of boxes and triangles.
 struct Way<'a> {
     ray: &'a Ray,
     frame: RayFrame,
@@ -99,12 +99,12 @@ struct Way<'a> {
 /// State of a bundle's traversal.
 struct Rays<'a, S> {
     ways: Vec<Way<'a>, BUNDLE_RAYS>,
-    /// Maximum distance of each ray's further hits, metres, as `f32` bits.
+    /// Maximum distance at which each ray still needs hits, metres, as `f32` bits.
     until: [u32; BUNDLE_RAYS],
     searches: &'a mut [S; BUNDLE_RAYS],
 }
 
-/// Removes the lowest set bit and returns its index; `None` if no bit is set.
+/// Clears the lowest set bit of `rays` and returns its index; `None` if no bit is set.
 #[inline(always)]
 fn take(rays: &mut u32) -> Option<usize> {
     let index = rays.trailing_zeros();
@@ -180,7 +180,8 @@ impl<'a, S: Search> Rays<'a, S> {
         Self { ways, until, searches }
     }
 
-    /// Rays in the bits pushed with a child whose maximum distance is not below the distance in these bits.
+    /// Set of the rays that may still have a hit in a child that was pushed with `bits` (`RAYS`): with
+    /// nearest-first order, only rays whose maximum distance reaches the distance in `bits`.
     #[inline(always)]
     fn within(&self, isa: impl Isa, bits: u32) -> u32 {
         match S::ORDER {
@@ -189,8 +190,8 @@ impl<'a, S: Search> Rays<'a, S> {
         }
     }
 
-    /// Bits to push with each child of a node: the rays of `here` that enter the child's box, and the least
-    /// distance at which one of them does.
+    /// Tests the rays `here` against the boxes of a node's children. Returns the bits to push with each child
+    /// (`RAYS`): the rays that enter its box, and their least distance; `BEYOND` if no ray enters it.
     #[inline(always)]
     fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
         let children = WideNode(node.0).children() as usize;

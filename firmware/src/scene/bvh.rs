@@ -24,7 +24,7 @@ use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::wide_tree::{Descent, END_OF_GROUP, Order, Outside, Stack};
 
-/// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
+/// Finds the closest hit of a ray. Of hits at equal distances, the lower triangle index wins.
 ///
 /// # Errors
 /// If the card image is invalid: a record is out of range, or the hierarchy is deeper than the stack.
@@ -133,8 +133,8 @@ pub(super) trait Search {
     /// distance of further hits, or [`ControlFlow::Break`] if no further hit is needed.
     fn meet(&mut self, hit: Intersection, id: TriangleId, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
-    /// Takes a hit of flat glass with a transmittance. Returns [`ControlFlow::Break`] if no further hit is
-    /// needed.
+    /// Processes a hit of flat glass with a given transmittance. Returns [`ControlFlow::Break`] if no further
+    /// hit is needed.
     fn pass(&mut self, _transmittance: Vec3) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -190,8 +190,8 @@ impl<F: FnMut(Hit)> Search for Every<F> {
 
 /// Fraction of the light that passes along a shadow ray.
 ///
-/// Factors are multiplied in the unsorted order of the visits. The order depends only on the tree and the
-/// ray, so that rounding is equal in all bundles and on every processor.
+/// Transmittances are multiplied in the order of traversal, which depends only on the tree and the ray. The
+/// product is therefore rounded in the same way in every bundle and on every processor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed(pub Vec3);
 
@@ -216,7 +216,7 @@ impl Search for Passed {
     }
 }
 
-/// Follows a ray through the hierarchy and passes its hits to `search`.
+/// Traverses the hierarchy along a ray and passes the hits to `search`.
 #[inline(always)]
 fn descend<S: Search>(
     isa: impl Isa,
@@ -326,8 +326,8 @@ pub(super) type BvhStack = Stack<STACK>;
 /// Entries of a [`BvhStack`].
 pub(super) const STACK: usize = BVH_STACK + LANES;
 
-/// Passes the hits of a ray in a leaf, up to the distance `until`, to `search`. Returns the new maximum
-/// distance, or [`ControlFlow::Break`] if no further hit is needed.
+/// Passes the hits of a ray with a leaf's triangles, up to the distance `until`, to `search`. Returns the new
+/// maximum distance, or [`ControlFlow::Break`] if no further hit is needed.
 #[inline(always)]
 pub(super) fn meet_leaf<S: Search>(
     scene: &SceneImage,

@@ -16,7 +16,7 @@ use crate::vector::unit;
 
 const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 
-/// Vertex attributes of a triangle, and the point at which they are interpolated.
+/// Vertex attributes of a triangle, and the barycentric coordinates at which they are interpolated.
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
@@ -51,14 +51,14 @@ impl Corners {
         Ok(Some(Self { leaf, slot, instance, attributes, weights }))
     }
 
-    /// Interpolated unit shading normal on the front; `None` for a triangle without shading normals.
+    /// Interpolated unit shading normal on the front side; `None` if the triangle has no shading normals.
     pub(super) fn normal(&self) -> Option<Vec3> {
         self.attributes.normals.map(|normals| unit(self.interpolated(normals)))
     }
 
-    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as programs that bake
-    /// normal maps assume. The normal is `front_normal` if the triangle has no shading normals. The material
-    /// must have a normal map.
+    /// Interpolated tangent, bitangent and normal on the front side. They are not normalised (the convention
+    /// of `MikkTSpace`). A triangle without shading normals has the normal `front_normal`. The material must
+    /// have a normal map.
     pub(super) fn frame(
         &self,
         scene: &SceneImage,
@@ -77,14 +77,14 @@ impl Corners {
         Ok([tangent, normal.cross(tangent) * sign, normal])
     }
 
-    /// Weighted mean of the unit vectors at the corners.
+    /// Weighted mean of the normalised `directions` at the three corners; not normalised.
     #[inline(always)]
     fn interpolated(&self, directions: [[f32; 3]; 3]) -> Vec3 {
         let weighted = directions.into_iter().zip(self.weights);
         weighted.map(|(direction, weight)| unit(direction.into()) * weight).sum()
     }
 
-    /// Interpolated vertex colour, linear red, green, blue and alpha.
+    /// Interpolated vertex colour: linear RGBA.
     pub(super) fn colour(&self) -> [f32; 4] {
         let mut sum = [0.0; 4];
         for (colour, weight) in self.attributes.colours.into_iter().zip(self.weights) {
@@ -93,12 +93,12 @@ impl Corners {
         sum
     }
 
-    /// Index of the triangle's emitter, if it emits.
+    /// Index of the triangle's emitter; `None` if the triangle does not emit.
     pub(super) fn emitter(&self) -> Option<u32> {
         self.attributes.emitter
     }
 
-    /// Value of texture `index` at the point; 1 in all channels for [`NO_TEXTURE`].
+    /// Value of texture `index` at the point, linear RGBA; 1 in all channels if `index` is [`NO_TEXTURE`].
     pub(super) fn texture(
         &self,
         scene: &SceneImage,

@@ -13,9 +13,9 @@ use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};
 
-/// Returns true if a ray hits a triangle at the point with barycentric `weights`, in spite of cut-outs and
-/// partial coverage. The random choice depends only on the ray and the triangle, so that shadow rays, gather
-/// rays and photons agree on the mean. The back of a one-sided surface with partial coverage is never hit.
+/// Returns true if a ray hits a triangle at the point with the barycentric coordinates `weights`; false if
+/// the ray passes through a cut-out or a partly covered surface. Partial coverage is decided at random, by a
+/// hash of the ray and the triangle. A one-sided `BLEND` surface other than glass is never hit from behind.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -62,7 +62,7 @@ pub(super) fn coverage(
     Ok(covered(material, texture * colour))
 }
 
-/// Coverage of a material where the alphas of base texture and vertex colour have the product `alpha`.
+/// Coverage of a material, 0 to 1, where base texture times vertex colour has the alpha `alpha`.
 pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     if material.flags & BLENDS != 0 {
         alpha * material.cutoff

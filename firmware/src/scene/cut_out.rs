@@ -1,4 +1,4 @@
-//! Test whether a point of a triangle is cut out.
+//! Test whether a triangle is cut out at a given position.
 
 use glam::Vec3;
 use photoncard_shared::layout::TriangleId;

@@ -1,4 +1,4 @@
-//! Flat glass: thin walls and panes, which shadow rays pass.
+//! Transmittance of flat glass (thin walls and panes), which shadow rays pass without a change of direction.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Triangle, TriangleId};
@@ -8,7 +8,7 @@ use super::surface::{Surface, surface_of};
 use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 
-/// Transmittance of a flat glass triangle along a ray, at the point with barycentric `weights`.
+/// Transmittance, 0 to 1, of a flat glass triangle for a ray that hits it at the coordinates `weights`.
 ///
 /// # Errors
 /// If the card image is invalid.

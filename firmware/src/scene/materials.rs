@@ -24,7 +24,7 @@ pub(super) fn read_material(
     Ok(Material::read(bytes))
 }
 
-/// Returns whether a material has [`Layers`] or is rough glass.
+/// Returns true if a material has [`Layers`] or is rough glass.
 #[inline(always)]
 pub(super) fn has_layers(material: &Material) -> bool {
     material.layers.is_some()
@@ -41,7 +41,7 @@ pub(super) fn read_layers(
     Ok(Layers::read(bytes))
 }
 
-/// Reads the values of the layers' textures at a point.
+/// Samples all textures of a material's layers at a point; 1 without vertex attributes.
 pub(super) fn layer_texel(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -41,7 +41,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 use crate::memory::MemoryPort;
 use crate::simd::Isa;
 
-/// A ray: the points `origin + t direction` with `t` in (0, `max_distance`).
+/// A ray: the points `origin + t direction` with `t` in (0, `max_distance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Origin, metres.
@@ -59,7 +59,7 @@ impl Ray {
     }
 }
 
-/// A card image in memory. Its header locates the records.
+/// Scene data in card memory (card image): sections of records, located by the header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneImage {
     /// Validated header.
@@ -67,10 +67,10 @@ pub struct SceneImage {
 }
 
 impl SceneImage {
-    /// Reads record `index` of a section. Records have `N` bytes, `PER_LINE` of them per line.
+    /// Reads record `index` of a section. A record has `N` bytes; a line holds `PER_LINE` records.
     ///
     /// # Errors
-    /// [`FaultCode::Record`] past the section's last record, [`FaultCode::LineRange`] outside the memory.
+    /// [`FaultCode::Record`] if there is no record `index`; [`FaultCode::LineRange`] outside the memory.
     #[inline(always)]
     pub fn record<'m, const N: usize, const PER_LINE: u32>(
         &self,
@@ -84,8 +84,8 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
     }
 
-    /// Reads line `index` of a section whose records are one line each. Counters of memory traffic count the
-    /// bytes `used` of the line as requested.
+    /// Reads line `index` of a section whose records are one line each. `used` is the range of the line's
+    /// bytes that the caller needs; the statistics of memory traffic count these bytes as requested.
     ///
     /// # Errors
     /// As [`Self::record`].
@@ -126,16 +126,16 @@ fn read_slot<const N: usize>(
     }
 }
 
-/// Point just off a surface, on the side of `normal`, from which a ray does not hit the surface again.
+/// Moves a point just off its surface, towards `normal`, so that a ray from there does not hit it again.
 ///
 /// A computed point deviates from the triangle's plane by a few units in the last place of `magnitude`, the
-/// greatest coordinate of the corners and of the ray's origin. The offset is 32 such units.
+/// greatest absolute coordinate of the corners and of the ray's origin. The offset is 32 such units.
 #[inline(always)]
 pub fn offset_origin(position: Vec3, normal: Vec3, magnitude: f32) -> Vec3 {
     position + normal * (magnitude * (32.0 * f32::EPSILON) + f32::MIN_POSITIVE)
 }
 
-/// Maximum absolute value of the points' coordinates.
+/// Greatest absolute coordinate among all the points; 0 without points.
 #[inline(always)]
 pub fn magnitude(points: &[Vec3]) -> f32 {
     points

@@ -1,4 +1,4 @@
-//! Normal maps: normals given by a texture in the tangent space of a triangle's corners (`MikkTSpace`).
+//! Normal maps: textures of normals in the tangent space of the triangles (`MikkTSpace`).
 
 use glam::Vec3;
 use photoncard_shared::layout::{LayerTexture, Material, NO_TEXTURE};
@@ -10,8 +10,8 @@ use super::materials::read_layers;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
 
-/// Unit shading normal of a material's base on the front: that of the normal map, or interpolated between the
-/// corners; `None` if it is the geometric normal, `front_normal`.
+/// Unit shading normal of a material's base on the front side: from the normal map if there is one, else
+/// interpolated between the corners. `None` stands for the geometric normal, `front_normal`.
 #[inline(always)]
 pub(super) fn base_normal(
     scene: &SceneImage,
@@ -28,8 +28,9 @@ pub(super) fn base_normal(
     mapped_normal(scene, memory, map, corners, front_normal)
 }
 
-/// Unit normal on the front by a normal map, whose x and y are multiplied by a scale; interpolated between
-/// the corners if the texture is [`NO_TEXTURE`].
+/// Unit shading normal on the front side from the normal map `texture`, whose x and y are multiplied by
+/// `scale`. If the texture is [`NO_TEXTURE`], the normal is interpolated between the corners; `None` if they
+/// have no normals.
 #[inline(never)]
 pub(super) fn mapped_normal(
     scene: &SceneImage,

@@ -1,4 +1,4 @@
-//! A hit stored in twelve bytes, from which the surface can be read again.
+//! Hit of a ray, stored in twelve bytes, from which the surface can be read again.
 
 use photoncard_shared::layout::{NO_INSTANCE, TriangleId};
 use photoncard_shared::message::Fault;
@@ -36,8 +36,8 @@ impl Seen {
         (instance == NO_INSTANCE).then_some(Self { triangle: index, weights: [v, w] })
     }
 
-    /// Reads the surface at the point into `surface`, on the side of the ray's origin. If the material has
-    /// several layers, the surface is the base. The surface's `distance` is 0.
+    /// Reads the surface at the point into `surface`, for the side on which the origin of `ray` lies. Of a
+    /// material with several layers, the base is read. Sets `surface.distance` to 0.
     ///
     /// # Errors
     /// If the card image is invalid.

@@ -1,5 +1,5 @@
-//! Makes interpolated or mapped shading normals consistent with the triangle. Otherwise surfaces would be
-//! black where the normal points away from the viewer, or their mirror direction would lie below the surface.
+//! Corrects interpolated or mapped shading normals that point away from the viewer, or whose mirror direction
+//! lies below the triangle. Surfaces would be black there otherwise.
 
 use glam::Vec3;
 
@@ -8,12 +8,12 @@ use crate::vector::{max, min, mirror, unit};
 /// Minimum cosine between a shading normal and the direction to the viewer.
 const MIN_COSINE: f32 = 0.01;
 
-/// Returns true if a shading normal must be [`turned`] towards the viewer.
+/// Returns true if a shading normal's cosine to the viewer is below `MIN_COSINE`: it must be [`turned`].
 pub(super) fn points_away(normal: Vec3, outgoing: Vec3) -> bool {
     normal.dot(outgoing) < MIN_COSINE
 }
 
-/// Turns a shading normal towards the viewer if it points away, as it may at a silhouette.
+/// Turns a shading normal towards the viewer if it points away, as happens at silhouettes.
 pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if normal == geometric_normal {
         return normal;
@@ -25,8 +25,8 @@ pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Ve
     if turned.dot(geometric_normal) > 0.0 { turned } else { geometric_normal }
 }
 
-/// Moves a shading normal towards the [`bent`] normal by the fraction `share` of their difference. `share` is
-/// the lobe's fraction of the albedo: the Lambertian remainder needs the normal itself.
+/// Interpolates between a shading normal (`share` 0) and its [`bent`] normal (`share` 1). `share` is the
+/// lobe's fraction of the albedo: the lobe needs the bent normal, and the Lambertian part the normal itself.
 #[inline(always)]
 pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if share <= 0.0 || normal == geometric_normal {
@@ -36,9 +36,8 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
     if bent == normal { normal } else { unit(normal + (bent - normal) * min(share, 1.0)) }
 }
 
-/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing` lies
-/// above the triangle. `outgoing` itself must lie above the triangle. The cosine of the mirror direction to
-/// the triangle's normal becomes at least 0.01, or at grazing views 0.9 times that of `outgoing`.
+/// Bends a unit shading normal towards the triangle's normal `g` until the mirror direction `m` of `outgoing`
+/// lies above the triangle: `g.m >= min(0.01, 0.9 g.outgoing)`. `outgoing` must lie above the triangle.
 ///
 /// Let `r (sin b, cos b)` be the projection of `outgoing` onto the plane of the two normals, at the angle `b`
 /// from the triangle's. A shading normal at the angle `a` from the triangle's gives the mirror direction the

@@ -1,12 +1,14 @@
-//! Slab test of a ray against all boxes of a node at once.
+//! Slab test: intersects a ray with the boxes of all children of a node at once.
 //!
-//! On each axis, a side of a box is at `corner + unit * side`, where `side` is a byte. A ray with the
-//! direction component `d` reaches the side's plane at the distance `(corner - origin) / d + side * (unit /
-//! d)`. The first term and `unit / d` are common to all boxes of a node.
+//! On each axis, the coordinate of a box's face is `corner + unit * side`, where `side` is a byte. A ray with
+//! the direction component `d` reaches the face's plane at the distance
+//! `(corner - origin) / d + side * (unit / d)`. The first term and `unit / d` are common to all boxes of a
+//! node.
 //!
 //! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*). The first term is
-//! decreased for near planes and increased for far planes by more than its rounding error plus that of the
-//! triangle test. Boxes are enlarged by more than the rounding error of the second term and of the sum.
+//! decreased for near planes and increased for far planes, by more than its rounding error plus that of the
+//! triangle test. Stored boxes are enlarged by more than the rounding error of the second term and of the
+//! sum.
 
 use photoncard_shared::layout::{BvhAxis, BvhNode, Instance, NODE_CHILDREN, placed_point, placed_vector};
 
@@ -15,7 +17,7 @@ use crate::simd::{Isa, LANES};
 use crate::vector::{max, max_component, min};
 use crate::wide_tree::BEYOND;
 
-/// Ray, prepared for slab tests: origin and reciprocal direction, by axis.
+/// Ray prepared for slab tests: for each axis, the origin and the reciprocal of the direction.
 pub(super) struct Slabs {
     axes: [SlabAxis; 3],
 }
@@ -24,13 +26,13 @@ struct SlabAxis {
     origin: f32,
     /// Reciprocal of the direction's component on this axis.
     inverse: f32,
-    /// True if the reciprocal is negative, so that the upper side of a box is nearer.
+    /// True if the reciprocal is negative. The ray then reaches the upper face of a box first.
     is_downwards: bool,
     /// Margin for the rounding of a ray in a group's space, as a distance along the ray; 0 in world space.
     slack: f32,
 }
 
-/// Margin for rounding errors, as a fraction of the distance to the planes of a node's corner.
+/// Margin for rounding errors, divided by the distance along the ray to the plane of the node's corner.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// Minimum magnitude of a direction's component. It replaces smaller components, whose reciprocals would
@@ -89,7 +91,7 @@ impl SlabAxis {
         Self { origin, inverse, is_downwards: inverse < 0.0, slack: 0.0 }
     }
 
-    /// Distances along the ray to the planes of a node's boxes on this axis.
+    /// Prepares the distances along the ray to the planes of a node's boxes on this axis.
     #[inline(always)]
     fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
         let corner = (axis.corner - self.origin) * self.inverse;
@@ -99,13 +101,13 @@ impl SlabAxis {
     }
 }
 
-/// Planes of a node's boxes on one axis. Their distances along the ray are `near * unit + first` for the near
-/// sides and `far * unit + last` for the far ones.
+/// Planes of a node's boxes on one axis. The distance along the ray is `near * unit + first` to the near face
+/// of a box, and `far * unit + last` to the far face.
 struct Planes<'a> {
     near: &'a [u8; NODE_CHILDREN],
     far: &'a [u8; NODE_CHILDREN],
-    /// Lower bound, under rounding, of the distance to the plane of the node's corner. `last` is the upper
-    /// bound.
+    /// Distance along the ray to the plane of the node's corner, less the margin for rounding. `last` is the
+    /// distance plus this margin.
     first: f32,
     last: f32,
     unit: f32,

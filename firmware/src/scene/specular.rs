@@ -1,4 +1,4 @@
-//! The perfectly specular part of a surface: mirrors, smooth coats, smooth glass.
+//! Perfectly specular reflection and transmission: mirrors, smooth coats, smooth glass.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Material, PANE, THIN_WALLED};
@@ -13,18 +13,18 @@ pub struct Specular {
     pub reflected: Vec3,
     /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
-    /// Unit direction of the specular reflection; zero if it is the mirror direction about the shading
-    /// normal.
+    /// Unit direction of the specular reflection, if a microfacet of rough glass determines it; else zero,
+    /// for the mirror direction about the shading normal.
     pub beside: Vec3,
-    /// Unit direction in which the path is continued behind the surface, by transmission.
+    /// Unit direction in which an eye path or a photon continues behind the surface after transmission.
     pub behind: Vec3,
     /// Absorption coefficient behind the surface, 1/m; meaningless for flat glass.
     pub absorption: Vec3,
-    /// Probability with which the layer of flat glass (a thin wall, or a face of a pane) was chosen; 0 for
-    /// other surfaces. Light passes flat glass without a change of direction or medium.
+    /// Probability with which the base layer was chosen, if it is flat glass (a thin wall, or a face of a
+    /// pane); else 0. Light passes flat glass without a change of direction or medium.
     pub straight: f32,
-    /// Radiance in front divided by radiance behind at a transmittance of 1: `1 / n^2`, where `n` is the
-    /// index of refraction behind relative to that in front.
+    /// Ratio of radiances, in front to behind, at a transmittance of 1. It is `1 / n^2`, where `n` is the
+    /// index of refraction behind divided by the one in front; 1 for flat glass.
     pub radiance_scale: f32,
 }
 
@@ -44,7 +44,7 @@ impl Specular {
         Self { reflected, ..Self::NONE }
     }
 
-    /// Multiplies reflectance and transmittance by `share`.
+    /// Multiplies the reflectance and the transmittance by `share`.
     pub(super) fn dimmed(self, share: f32) -> Self {
         Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
     }
@@ -61,8 +61,8 @@ impl Specular {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// Mirror direction of `outgoing` about the shading normal. The normal is bent if that direction would be
-    /// below the surface.
+    /// Mirror direction of `outgoing` about the shading normal `normal`. If the mirror direction would lie
+    /// below the surface, the normal is `bent` first.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, bent(normal, outgoing, geometric_normal));
         // At grazing views, rounding may take the direction below the surface.
@@ -70,19 +70,19 @@ impl Specular {
     }
 }
 
-/// Kind of body that a glass surface bounds.
+/// Kind of glass body whose surface is hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bounds {
     /// A volume of glass.
     Solid,
     /// A wall without thickness, with air on both sides.
     ThinWall,
-    /// A pane; the surface is one of its faces ([`photoncard_shared::layout::PANE`]).
+    /// A slab whose faces are parallel; the surface is one face ([`photoncard_shared::layout::PANE`]).
     Pane,
 }
 
 impl Bounds {
-    /// Kind of body by the flags of a material.
+    /// Reads the kind of body from the flags of a material.
     #[inline(always)]
     pub(super) fn of(material: &Material) -> Self {
         match material.flags & (PANE | THIN_WALLED) {
@@ -96,12 +96,12 @@ impl Bounds {
 /// Smooth dielectric at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glass {
-    /// Tint of one passage through the surface: the base colour for a thin wall, its square root for a face
-    /// of a volume or a pane.
+    /// Colour that multiplies the light at each passage of the surface: the base colour for a thin wall; its
+    /// square root for a volume or a pane, which has two faces.
     pub(super) base: Vec3,
-    /// Absorption coefficient inside, 1/m; for a pane, the optical depth.
+    /// Absorption coefficient inside, 1/m; for a pane, the optical depth along the normal.
     pub(super) absorption: Vec3,
-    /// Fraction of the light past the Fresnel reflection that is transmitted.
+    /// Transmitted fraction of the light that the Fresnel reflection leaves.
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
@@ -111,8 +111,8 @@ pub(super) struct Glass {
 }
 
 impl Glass {
-    /// Fraction of the light that is left for the Lambertian base, and the specular part. Normals are on the
-    /// side of `outgoing`, which is the inside of the body if `is_inside`.
+    /// Returns the fraction of the light that is left for the Lambertian base, and the specular part. Both
+    /// normals are on the side of `outgoing`. `is_inside` is true if this side is the inside of the body.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
@@ -149,9 +149,9 @@ impl Glass {
         (through * (1.0 - self.transmission), specular)
     }
 
-    /// Specular part of the face of a pane where light enters. `R` is a face's reflectance at this angle.
-    /// With the transmittance `a` inside, from face to face, the pane transmits `(1 - R)^2 a / (1 - R^2 a^2)`
-    /// and reflects `R + (1 - R)^2 R a^2 / (1 - R^2 a^2)`.
+    /// Does `Self::at` for the outer side of a pane's face, which has the scattering of the whole pane. A
+    /// face has the reflectance `R` at this angle, and the glass between the faces has the transmittance `a`.
+    /// The pane transmits `(1 - R)^2 a / (1 - R^2 a^2)` and reflects `R + (1 - R)^2 R a^2 / (1 - R^2 a^2)`.
     #[inline(never)]
     fn pane(&self, outgoing: Vec3, reflectance: f32, cosine_inside: f32) -> (f32, Specular) {
         let through = 1.0 - reflectance;
@@ -170,7 +170,7 @@ impl Glass {
         (through * (1.0 - self.transmission), specular)
     }
 
-    /// Specular part of the face of a pane where light leaves.
+    /// Does `Self::at` for the inner side of a pane's face, which transmits without specular reflection.
     fn passed_on(&self, outgoing: Vec3) -> (f32, Specular) {
         let transmitted = self.base * self.transmission;
         let specular = Specular { transmitted, behind: -outgoing, straight: 1.0, ..Specular::NONE };
@@ -178,8 +178,8 @@ impl Glass {
     }
 }
 
-/// Fresnel reflectance of unpolarised light at a dielectric, and cosine of the refracted direction; 1 and 0
-/// under total internal reflection. `index` is the index of refraction behind divided by that in front.
+/// Fresnel reflectance of a dielectric for unpolarised light, and cosine of the refracted direction; `(1, 0)`
+/// under total internal reflection. `index` is the index of refraction behind divided by the one in front.
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;

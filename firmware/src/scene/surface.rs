@@ -1,5 +1,5 @@
-//! Surfaces: the material of a triangle at the point where a ray hits it, with textures applied, seen from
-//! the ray's side.
+//! Surface at the point where a ray hits a triangle: geometry, and the material with textures applied, for
+//! the side from which the ray comes.
 
 use glam::Vec3;
 use photoncard_shared::layout::{
@@ -19,45 +19,45 @@ use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origi
 use crate::memory::MemoryPort;
 use crate::vector::{max, max_component, min, unit};
 
-/// Number of random choices that [`read_surface`] makes.
+/// Number of random numbers that [`read_surface`] may use.
 pub const SURFACE_CHOICES: u32 = 4;
 
-/// Surface at a point that a ray hits, on the side of the ray's origin.
+/// Surface at a point that a ray hits, seen from the ray's side: the side on which the ray's origin lies.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Position, metres.
     pub position: Vec3,
-    /// Unit shading normal on the side of the ray's origin.
+    /// Unit shading normal on the ray's side.
     pub normal: Vec3,
-    /// Unit normal of the triangle on the side of the ray's origin.
+    /// Unit normal of the triangle on the ray's side.
     pub geometric_normal: Vec3,
-    /// Unit vector against the ray's direction.
+    /// Unit vector opposite to the ray's direction.
     pub outgoing: Vec3,
-    /// Reflection of the ray's side without the perfectly specular part; black on the back of a one-sided
+    /// Reflection on the ray's side, without the perfectly specular part; black on the back of a one-sided
     /// surface.
     pub reflection: Reflection,
-    /// The perfectly specular part.
+    /// Perfectly specular reflection and transmission.
     pub specular: Specular,
     /// Absorption coefficient of the glass that the ray passed through, 1/m; zero in air.
     pub absorption: Vec3,
-    /// Radiance that the ray's side emits, W/(sr m^2).
+    /// Radiance emitted by the ray's side, W/(sr m^2).
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to; `None` if it is not an emitter.
     pub emitter: Option<u32>,
-    /// Probability of the random choices of a layer and of a part of the reflection; 1 if none was made.
-    /// `reflection` is divided by this probability, `specular` by that of the layer, `emission` by that of
-    /// all layers that emit.
+    /// Probability of the random choices: of a material layer, and of the Lambertian part or the lobe; 1 if
+    /// none was made. `reflection` is already divided by this probability, and `specular` by the probability
+    /// of the layer. `emission` is divided by the probability of the choice of any layer that emits.
     pub probability: f32,
-    /// Fraction of the surface that is present; 1 without partial coverage. A ray hits the surface with this
-    /// probability.
+    /// Fraction of the surface that is present: the probability with which a ray hits it; 1 without partial
+    /// coverage.
     pub coverage: f32,
-    /// True if this is the far side of a surface, seen through the surface (diffuse or rough transmission).
-    /// Photons are stored on the side where they arrive.
+    /// True if the values describe the far side of the surface, seen through it by diffuse or rough
+    /// transmission. The photons that the reflection needs are stored on the far side.
     pub is_behind: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Maximum absolute coordinate from which `position` was computed, metres. The rounding error of
-    /// `position` is proportional to this coordinate.
+    /// Maximum absolute coordinate of the triangle's corners and of the ray's origin, metres. The rounding
+    /// error of `position` is proportional to it.
     pub magnitude: f32,
 }
 
@@ -85,13 +85,13 @@ impl Surface {
         }
     }
 
-    /// Replaces the shading normal by the geometric normal, as for storing and gathering photons.
+    /// Replaces the shading normal by the geometric normal, with which photons are stored and gathered.
     #[inline(always)]
     pub fn flat(self) -> Self {
         Self { normal: self.geometric_normal, ..self }
     }
 
-    /// Reflection seen from the ray's origin.
+    /// Reflection towards the ray's origin, for evaluation and sampling.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let Self { normal, geometric_normal, outgoing, reflection, .. } = *self;
@@ -106,7 +106,8 @@ impl Surface {
         self
     }
 
-    /// Turns the surface into its far side, seen through the surface: `outgoing` is mirrored to the far side.
+    /// Reverses the geometric normal and mirrors `outgoing`, for the far side of the surface seen through it.
+    /// `normal` must already be that of the far side.
     fn see_through(&mut self) {
         let front = -self.normal;
         self.geometric_normal = -self.geometric_normal;
@@ -114,25 +115,25 @@ impl Surface {
         self.is_behind = true;
     }
 
-    /// Point just off the ray's side of the surface, from which a ray does not hit the surface again.
+    /// Origin of new rays on the ray's side: a point just off the surface, which they do not hit again.
     #[inline(always)]
     pub fn offset_origin(&self) -> Vec3 {
         offset_origin(self.position, self.geometric_normal, self.magnitude)
     }
 
-    /// Point just off the far side of the surface, from which a ray does not hit the surface again.
+    /// Origin of new rays on the far side: a point just off the surface, which they do not hit again.
     pub fn offset_behind(&self) -> Vec3 {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
 
     /// Returns true if a direction is above the horizons of both the shading and the geometric normal. Light
-    /// from other directions is excluded, so that smooth shading leaks no light.
+    /// from other directions is ignored, so that smooth shading does not leak light through the triangle.
     #[inline(always)]
     pub fn is_above(&self, direction: Vec3) -> bool {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
     }
 
-    /// Direction of the specular reflection towards `outgoing`: a unit vector away from the surface.
+    /// Unit direction, away from the surface, from which the specular reflection towards `outgoing` comes.
     pub fn mirrored(&self) -> Vec3 {
         if self.specular.beside != Vec3::ZERO {
             return self.specular.beside;
@@ -142,8 +143,9 @@ impl Surface {
 }
 
 /// Reads the surface where a ray hits a triangle into `surface`. The result is written in place, because a
-/// chip would copy its 230 bytes one by one. `random` maps the numbers 0 to [`SURFACE_CHOICES`] - 1 of random
-/// choices to values in [0, 1), which choose one of the layers; the value 0 of choice 0 chooses the base.
+/// chip would copy its 230 bytes one by one. `random(i)` must return random number `i` in [0, 1), for `i`
+/// from 0 to [`SURFACE_CHOICES`] - 1. The numbers choose one of the material's layers; `random(0) == 0`
+/// chooses the base.
 ///
 /// # Errors
 /// If the triangle's material is not in the card image.
@@ -162,7 +164,7 @@ pub fn read_surface(
     Ok(())
 }
 
-/// Does [`read_surface`] for the point of a triangle with barycentric `weights`; the distance is set to 0.
+/// Does [`read_surface`] for the barycentric coordinates `weights`. Sets `surface.distance` to 0.
 #[inline(always)]
 pub(super) fn surface_of(
     scene: &SceneImage,
@@ -200,13 +202,13 @@ pub(super) fn surface_of(
     Ok(())
 }
 
-/// Returns true for a material without textures, vertex attributes and layers.
+/// Returns true if a material has neither textures nor vertex attributes nor layers.
 #[inline(always)]
 fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
-/// Applies vertex attributes, textures and material to a surface whose untextured emission is set.
+/// Applies vertex attributes, textures and material to a surface. Its untextured emission must be set.
 #[inline(never)]
 fn finish(
     scene: &SceneImage,
@@ -251,15 +253,14 @@ fn finish(
     Ok(())
 }
 
-/// Minimum probability of the Lambertian part and of the narrow lobe, where [`shade_by_parts`] chooses one of
-/// them.
+/// Minimum probability with which [`shade_by_parts`] chooses the Lambertian part, and the narrow lobe.
 const MIN_PART: f32 = 1.0 / 8.0;
 
-/// Adapts the shading normal of a surface, which comes from the corners or from a normal map. The Lambertian
-/// part keeps this normal; a lobe or a mirror needs the [`bent`] normal. If a narrow lobe and the Lambertian
-/// part need different normals, `random`, in [0, 1), chooses one of the parts, and its reflection is divided
-/// by the probability. A wide lobe, for which photons are stored, and the Lambertian part share a normal in
-/// between ([`bent_by_share`]).
+/// Sets the shading normal that the surface's reflection needs. The Lambertian part needs the normal of the
+/// corners or of the normal map; a lobe or a mirror needs the [`bent`] normal. A wide lobe and the Lambertian
+/// part share a normal in between ([`bent_by_share`]). If a narrow lobe and the Lambertian part need
+/// different normals, the random number `random`, in [0, 1), chooses one of the two. Its reflection is
+/// divided by the probability of the choice.
 #[inline(never)]
 fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     let Surface { normal, geometric_normal, outgoing, reflection, .. } = *surface;
@@ -289,8 +290,9 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     surface.probability *= probability;
 }
 
-/// Sets a surface's scattering to that of one layer of its material, chosen at random. The surface emits
-/// whichever layer of the ray's side is chosen.
+/// Chooses one layer of a surface's material at random and sets the surface's scattering to that of the
+/// layer. If the far side is chosen (`Layer::Behind`), the emission becomes zero; otherwise it is divided
+/// by the probability that another layer is chosen.
 #[inline(never)]
 fn take_layer(
     scene: &SceneImage,

@@ -13,7 +13,7 @@ const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 
 const TEXEL_BYTES: u32 = 4;
 
-/// Reads texture `index`.
+/// Reads the parameters of texture `index`, without its texels.
 ///
 /// # Errors
 /// If there is no such texture.
@@ -23,7 +23,7 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Texture::read(bytes))
 }
 
-/// Value of a texture at texture coordinates: linear RGBA.
+/// Value of a texture at texture coordinates, bilinearly interpolated or of the nearest texel: linear RGBA.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -56,7 +56,7 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// The two neighbouring texels on one axis between whose centres a position lies.
+/// On one axis of a texture, the two adjacent texels between whose centres a coordinate lies.
 struct TexelPair {
     /// Indices of the two texels.
     texels: [u32; 2],
@@ -92,7 +92,7 @@ impl TexelPair {
         Self { texels: [wrapped(first), wrapped(first + 1)], fraction: at - first as f32 }
     }
 
-    /// Both texels with their weights.
+    /// Indices of both texels with their weights, whose sum is 1.
     fn texels(&self) -> [(u32, f32); 2] {
         let [first, second] = self.texels;
         [(first, 1.0 - self.fraction), (second, self.fraction)]
@@ -104,7 +104,7 @@ impl TexelPair {
     }
 }
 
-/// Reads and decodes a texel.
+/// Reads a texel and decodes it to linear RGBA.
 fn texel(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -120,7 +120,7 @@ fn texel(
     Ok(decode_texel(texture.format, texel))
 }
 
-/// Minimum and maximum of each channel over all texels: linear RGBA.
+/// Minimum and maximum of each channel, linear RGBA, over all texels of a texture.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -169,12 +169,12 @@ pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     }
 }
 
-/// Decodes two linear channels of 16 bits.
+/// Decodes two 16-bit channels to linear values, 0 to 1.
 fn pair([a, b, c, d]: [u8; 4]) -> [f32; 2] {
     [[a, b], [c, d]].map(|code| f32::from(u16::from_le_bytes(code)) * (1.0 / 65_535.0))
 }
 
-/// Linear value of an sRGB code (IEC 61966-2-1).
+/// Linear value, 0 to 1, of an sRGB byte (IEC 61966-2-1).
 fn srgb(code: u8) -> f32 {
     SRGB.get(usize::from(code)).copied().unwrap_or(1.0)
 }
@@ -199,7 +199,7 @@ const fn srgb_table() -> [f32; 256] {
     table
 }
 
-/// Fifth root of a number in (0, 1], by Newton's method from above.
+/// Fifth root of a number in (0, 1], by Newton's method.
 const fn fifth_root(number: f64) -> f64 {
     let mut root = 1.0;
     let mut step = 0;

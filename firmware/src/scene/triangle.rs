@@ -1,9 +1,8 @@
-//! Watertight intersection of ray and triangle (Woop, Benthin, Wald 2013, *Watertight ray/triangle
-//! intersection*).
+//! Watertight ray-triangle intersection (Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*).
 //!
-//! A ray that passes an edge shared by two triangles hits at least one of them. Coordinates are sheared so
-//! that the ray runs along +z; the signs of three edge functions decide whether the ray hits the triangle. An
-//! edge function that is zero in `f32` is computed again in `f64`, in which the products are exact.
+//! A ray through an edge that two triangles share hits at least one of the two. The triangle is sheared so
+//! that the ray runs along +z. The signs of three edge functions then decide whether the ray hits it. If an
+//! edge function is zero in `f32`, all three are computed again in `f64`, in which their products are exact.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, TriangleId, VERTEX_LANES};
@@ -14,12 +13,12 @@ use crate::vector::{max, min};
 
 const _: () = assert!(LEAF_TRIANGLES == HALF_LANES && VERTEX_LANES <= LANES);
 
-/// Ray, prepared for intersections with triangles: permutation of the axes, and shear.
+/// Ray prepared for tests of triangles: its origin, the permutation of the axes, and the shear.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
     /// Permutation of the axes that puts the direction's greatest component last.
     axes: [usize; 3],
-    /// Origin of the ray, on the permuted axes.
+    /// Origin of the ray on the permuted axes, metres.
     origin: [f32; 3],
     shear: [f32; 3],
 }
@@ -33,7 +32,7 @@ pub struct Intersection {
     pub barycentric: [f32; 3],
 }
 
-/// Intersection and the triangle that was hit.
+/// Intersection, with the triangle that was hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance and barycentric coordinates.
@@ -54,7 +53,7 @@ fn component([x, y, z]: [f32; 3], axis: usize) -> f32 {
 }
 
 impl RayFrame {
-    /// Computes the axes and the shear of a ray.
+    /// Computes the permutation and the shear from a ray's direction.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
         let magnitude = ray.direction.abs();
@@ -75,8 +74,8 @@ impl RayFrame {
         Self { axes, origin: on_axes(ray.origin), shear: [x / z, y / z, 1.0 / z] }
     }
 
-    /// Shears a corner, given relative to the origin on the permuted axes. Returns the corner and its
-    /// unscaled depth.
+    /// Shears a corner, given on the permuted axes. Returns the sheared x and y relative to the ray's origin,
+    /// and the depth, z less the origin's z, not yet divided by the direction's z.
     #[inline(always)]
     fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let [origin_x, origin_y, origin_z] = self.origin;
@@ -85,7 +84,7 @@ impl RayFrame {
         ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
     }
 
-    /// Shears the triangles of a leaf. `corners` is the leaf's [`BvhLeaf::all_corners`].
+    /// Shears the triangles of a leaf. `corners` must be the leaf's [`BvhLeaf::all_corners`].
     #[inline(always)]
     pub(super) fn leaf<'a>(&self, isa: impl Isa, leaf: BvhLeaf, corners: &'a Corners) -> ShearedLeaf<'a> {
         let [x, y, z] = self.axes;
@@ -111,8 +110,8 @@ impl RayFrame {
                 [x.get(lane).copied().unwrap_or(0.0), y.get(lane).copied().unwrap_or(0.0)]
             };
             let [u, v, w] = edges(at(&a), at(&b), at(&c));
-            // If the product is zero, `f32` leaves the sign of an edge function undecided: the triangle may
-            // be hit.
+            // A product of zero means that an edge function may be zero only by rounding. The triangle may
+            // then be hit.
             let is_missed = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
             if let (Some(miss), Some(us), Some(vs), Some(ws)) =
                 (misses.get_mut(lane), us.get_mut(lane), vs.get_mut(lane), ws.get_mut(lane))
@@ -124,7 +123,7 @@ impl RayFrame {
         ShearedLeaf { may_meet, across, up, depth, corners, edges: edge_lanes }
     }
 
-    /// Intersects either side of a triangle at a distance in (0, `max_distance`].
+    /// Intersects the ray with either side of a triangle, at a distance in (0, `max_distance`], metres.
     #[inline(always)]
     pub fn intersect(&self, vertices: &[[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
         let [x, y, z] = self.axes;
@@ -133,7 +132,7 @@ impl RayFrame {
         self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
     }
 
-    /// Intersects either side of triangle `slot` of a leaf, as [`Self::intersect`] does.
+    /// Does [`Self::intersect`] for triangle `slot` of a leaf.
     #[inline(always)]
     pub(super) fn intersect_slot(
         &self,
@@ -181,27 +180,26 @@ impl RayFrame {
     }
 }
 
-/// Vertex indices of the first, second and third corners of a leaf's triangles.
+/// Indices, in a leaf's list of vertices, of the first, second and third corners of all its triangles.
 pub(super) type Corners = [[u32; LEAF_TRIANGLES]; 3];
 
-/// Triangles of a leaf in the coordinates of a [`RayFrame`].
+/// Triangles of a leaf, sheared by a [`RayFrame`].
 pub(super) struct ShearedLeaf<'a> {
-    /// Bit mask of the triangles that the ray's line may hit: a superset of the hits of
-    /// [`RayFrame::intersect_slot`].
+    /// Bit mask of the triangles that the ray may hit: a superset of those for which
+    /// [`RayFrame::intersect_slot`] returns a hit.
     pub(super) may_meet: u32,
     /// Sheared x coordinates of the vertices.
     across: [f32; LANES],
     up: [f32; LANES],
-    /// Unscaled depths of the vertices.
+    /// Depths of the vertices along z, not divided by the ray direction's z.
     depth: [f32; LANES],
-    /// Vertex indices of the triangles' first, second and third corners.
     corners: &'a Corners,
     /// Edge functions of the triangles.
     edges: [[f32; LEAF_TRIANGLES]; 3],
 }
 
 impl ShearedLeaf<'_> {
-    /// Sheared position of a triangle's corner, and its depth.
+    /// Sheared position and depth of a corner of triangle `slot`. `corner` is one of the `Corners` lists.
     #[inline(always)]
     fn vertex(&self, corner: &[u32; LEAF_TRIANGLES], slot: usize) -> ([f32; 2], f32) {
         let index = corner.get(slot).copied().unwrap_or(0) as usize % LANES;
@@ -210,7 +208,7 @@ impl ShearedLeaf<'_> {
     }
 }
 
-/// Sheared coordinates of one corner of every triangle, permuted from the leaf's vertices.
+/// Sheared x and y of one corner of every triangle: the coordinates of the vertices `vertices`.
 #[inline(always)]
 fn permute(
     isa: impl Isa,
@@ -221,7 +219,7 @@ fn permute(
     [isa.permute(across, vertices), isa.permute(up, vertices)]
 }
 
-/// Edge functions of a sheared triangle at the origin, each for the edge opposite to a corner.
+/// Edge functions of a sheared triangle at the origin; the first is for the edge opposite to `a`, and so on.
 #[inline(always)]
 fn edges(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> [f32; 3] {
     [cross(c, b), cross(a, c), cross(b, a)]

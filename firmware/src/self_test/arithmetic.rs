@@ -5,8 +5,8 @@
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 
-/// Expressions of the results, with the operands `a`, `b` and `c`. `bits` gives the bits of its arguments as
-/// one integer.
+/// Expressions that the self-test computes, as text, with the operands `a`, `b` and `c`. `bits` gives the
+/// bits of its arguments as one integer.
 pub const EXPRESSIONS: [&str; RESULTS] = [
     "a + b",
     "a - b",

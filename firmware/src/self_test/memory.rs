@@ -10,8 +10,8 @@ use crate::memory::{CardMemory, outside};
 /// Number of lines written or read per step: 8 KB.
 const STEP_LINES: u32 = 64;
 
-/// Number of lines after which a test reports its progress: 1 MB, which a memory faster than 9 KB/s passes
-/// within the 120 s that a host waits for progress.
+/// Number of lines, 1 MB, after which a test reports its progress. A host waits 120 s for progress, which
+/// suffices for a memory of 9 KB/s.
 const REPORT_LINES: u32 = 8192;
 
 /// Value of word `index` in a pattern. The function is not inlined: otherwise each loop over words would be
@@ -34,7 +34,7 @@ pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
     }
 }
 
-/// Byte of a word that [`MemoryPattern::ByteLanes`] replaces, and its new value.
+/// Index, in word `index`, of the byte that [`MemoryPattern::ByteLanes`] replaces, and the byte's new value.
 fn replaced(index: u32) -> (usize, u8) {
     let lane = index % 4;
     (lane as usize, (index >> (8 * lane)) as u8)

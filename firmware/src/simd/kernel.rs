@@ -9,7 +9,8 @@ pub const HALF_LANES: usize = LANES / 2;
 
 /// An instruction set. A value of an implementing type is the proof that the processor supports it.
 pub trait Isa: Copy {
-    /// Number of lanes that a loop computes if `used` are needed: all lanes if that costs no more.
+    /// Number of lanes that a loop computes if only the first `used` are needed: [`LANES`] where all lanes
+    /// cost no more.
     fn lanes(self, used: usize) -> usize;
 
     /// Bit mask of the lanes whose value is below `bound`. Lane 0 is the lowest bit.
@@ -23,7 +24,7 @@ pub trait Isa: Copy {
     /// does for 32-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
-    /// Permutation: the values at `indices`. Only the lower four bits of an index count.
+    /// Returns the values at `indices`. Only the lower four bits of an index count.
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
     /// Prefetches a line into the processor's cache, if the instruction set supports it.

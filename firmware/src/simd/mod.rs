@@ -25,7 +25,7 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// An instruction set by name, for tests that all sets give the same bits.
+/// An instruction set by name. Tests use it to check that all sets give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// The portable fallback ([`Portable`]).

@@ -152,7 +152,7 @@ impl Isa for Avx512 {
     }
 }
 
-/// For each mask of eight lanes, indices of the set lanes, ascending.
+/// Indices of the set lanes, ascending, for each mask of eight lanes.
 const LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
@@ -170,7 +170,7 @@ const LANES_OF: [[u8; 8]; 256] = {
     lanes_of
 };
 
-/// For each mask of four 64-bit lanes, the indices of the set lanes, ascending. Each lane is given as its two
+/// Indices of the set lanes, ascending, for each mask of four 64-bit lanes. Each lane is given as its two
 /// 32-bit halves, `2 * lane` and `2 * lane + 1`.
 const LONG_LANES_OF: [[u8; 8]; 16] = {
     let mut lanes_of = [[0; 8]; 16];

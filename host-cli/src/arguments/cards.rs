@@ -68,7 +68,8 @@ pub(crate) struct CardOptions {
 }
 
 impl CardOptions {
-    /// Returns the cards that these options state; by default emulated reference chips, one per core.
+    /// Returns the cards of `--card` with the settings of these options. The default is one emulated
+    /// reference chip per core.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
@@ -99,12 +100,11 @@ pub(crate) struct ChipOption {
 }
 
 impl ChipOption {
-    /// Kind of chip in the file of `--chip`, or `kind` without such a file.
+    /// Returns the kind of chip that the file of `--chip` describes, or `kind` if `--chip` is not stated.
     pub(crate) fn or(&self, kind: EmulatedKind) -> EmulatedKind {
         self.chip.unwrap_or(kind)
     }
 
-    /// Returns whether `--chip` is stated.
     pub(crate) fn is_stated(&self) -> bool {
         self.chip.is_some()
     }
@@ -120,9 +120,10 @@ pub(crate) struct MemoryOption {
 }
 
 impl MemoryOption {
-    /// Returns `address` with the stated memory for emulated cards. Without a stated memory, cards have the
-    /// memory of their kind; the reference and the large chip have a quarter of the machine's free memory if
-    /// that is more, as the host takes up to four times as much memory as a card.
+    /// Returns `address` with its card memory set to `--card-memory` if the card is emulated. By default a
+    /// reference or large chip has a quarter of the machine's free memory, but at least the memory of its
+    /// kind; the host itself takes up to four times a card's memory. Other cards keep the memory of their
+    /// kind.
     pub(super) fn of(&self, address: CardAddress) -> CardAddress {
         self.with_free(free_memory(), address)
     }
@@ -141,7 +142,6 @@ impl MemoryOption {
         }
     }
 
-    /// Returns whether `--card-memory` is stated.
     pub(super) fn is_stated(&self) -> bool {
         self.card_memory.is_some()
     }
@@ -162,7 +162,7 @@ pub(super) fn memory_size(text: &str) -> Result<u64, String> {
         })
 }
 
-/// Parser of the path of a JSON file, which reads the kind of chip in it.
+/// Returns a parser that reads the JSON file at the argument's path, and yields the kind of chip in it.
 fn kind_of_file() -> impl TypedValueParser<Value = EmulatedKind> {
     PathBufValueParser::new().try_map(|path| Emulated::read(&path).map(EmulatedKind::File))
 }

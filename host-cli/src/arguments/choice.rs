@@ -1,4 +1,4 @@
-//! Parsers of arguments whose values have names.
+//! Clap parsers of arguments whose values are names from a fixed list.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use photoncard_driver::choice::Choice;

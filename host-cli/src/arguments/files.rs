@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 
-/// Output for text.
+/// Destination of text that a command writes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum TextOutput {
     StandardOutput,
@@ -28,16 +28,16 @@ pub(crate) enum PictureFormat {
     Exr,
     /// PNG: tone-mapped for a screen.
     Png,
-    /// Part of a picture, for `photoncard merge`.
+    /// Pixels of one part of a picture, which `photoncard merge` combines with the other parts.
     Part,
     /// Video of frames.
     Video,
 }
 
-/// Name of standard output.
+/// Path that means standard output.
 const STANDARD_OUTPUT: &str = "-";
 
-/// Output for a picture.
+/// Destination of a picture, with its file format.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PictureOutput {
     /// Path of the file; `-` for standard output, which takes a PNG.
@@ -57,8 +57,8 @@ impl PictureOutput {
     }
 }
 
-/// Formats that are not written: suffixes, name of the format, and what to give `-o` instead, with the
-/// command that converts it.
+/// Picture formats that are not written: the suffixes, the name, and a remedy. The remedy is an argument for
+/// `-o`, mostly followed by a command that converts the file.
 const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["jpg", "jpeg", "jpe"], "JPEG", "out.png, then: magick out.png out.jpg"),
     (&["webp"], "WebP", "out.png, then: magick out.png out.webp"),
@@ -74,7 +74,8 @@ const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["card"], "a prepared scene", "SCENE.card to photoncard prepare"),
 ];
 
-/// Message about a file suffix of which no picture is written, with a remedy.
+/// Returns the error message for a path whose suffix is not that of a picture format. The message has a
+/// remedy.
 fn other_format(ending: Option<&str>) -> String {
     let other =
         OTHER_FORMATS.iter().find(|(endings, ..)| ending.is_some_and(|ending| endings.contains(&ending)));

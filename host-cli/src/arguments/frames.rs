@@ -10,9 +10,7 @@ use serde_json::json;
 
 /// Default frames per second, that of Blender.
 const FPS: f64 = 24.0;
-/// Maximum frames per second.
 const MAX_FPS: f64 = 100_000.0;
-/// Maximum frame number.
 const MAX_FRAME: u32 = 999_999;
 
 #[derive(Args)]
@@ -34,28 +32,26 @@ pub(crate) struct FrameOptions {
     fps: Option<f64>,
 }
 
-/// Frame numbers, increasing.
 #[derive(Clone, Debug, PartialEq)]
 struct Frames(BTreeSet<u32>);
 
 impl FrameOptions {
-    /// Numbers of the frames, increasing; `None` for one picture of the scene at rest.
+    /// Frame numbers of `--frames`, increasing. `None` without `--frames`: one picture without animation.
     pub(crate) fn numbers(&self) -> Option<impl Iterator<Item = u32>> {
         self.frames.as_ref().map(|Frames(numbers)| numbers.iter().copied())
     }
 
-    /// Names of the animations that play; all of the file play if the list is empty.
+    /// Names of the animations that play. If the list is empty, all animations of the file play.
     pub(crate) fn animations(&self) -> &[String] {
         &self.animations
     }
 
-    /// Part of [`Self::provenance`] that all frames have in common.
+    /// Options that the pixels of all frames depend on: frames per second and animations.
     pub(crate) fn shared_provenance(&self) -> NamedSettings {
         let named = [("fps", json!(self.fps())), ("animation", json!(self.animations))];
         named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
     }
 
-    /// Frames per second.
     pub(crate) fn fps(&self) -> f64 {
         self.fps.unwrap_or(FPS)
     }
@@ -72,9 +68,9 @@ impl FrameOptions {
     }
 }
 
-/// Path of an existing file that has a number in place of the pattern's last run of `#`: the file with the
-/// greatest number up to `frame`. `None` if there is no such file. A pattern without `#` is returned as it
-/// is.
+/// Finds the file with the greatest frame number up to `frame`. File names are `pattern` with a number in
+/// place of its last run of `#`. Returns `None` if there is no such file, and `pattern` itself if it has no
+/// `#`.
 pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     if numbered(pattern, frame).is_none() {
         return Some(pattern.to_owned());

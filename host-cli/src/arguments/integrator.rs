@@ -58,11 +58,11 @@ enum Adaptive {
     Threshold(f32),
 }
 
-/// Default of `--ic-error` if the quality has no irradiance cache.
+/// Maximum error of interpolated irradiance if neither `--ic-error` nor `--quality` sets one.
 const DEFAULT_IC_ERROR: f32 = 0.025;
 
 impl IntegratorOptions {
-    /// Settings of these options. `base` supplies those that are not stated.
+    /// Returns the settings that these options state. Settings that are not stated are those of `base`.
     pub(super) fn settings(&self, base: &Integrator) -> Integrator {
         let gather_rays = self.gather_rays.unwrap_or(base.gather_rays);
         let error = self.ic_error.or(base.irradiance_error).unwrap_or(DEFAULT_IC_ERROR);
@@ -82,7 +82,7 @@ impl IntegratorOptions {
         }
     }
 
-    /// Returns which of the settings that a quality chooses are stated.
+    /// Returns which settings the options state, among those that `--quality` would choose.
     pub(super) fn stated(&self) -> Stated {
         Stated {
             samples: self.spp.is_some(),
@@ -100,8 +100,8 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// Calls `add` for each option that other options can make useless. The arguments of `add` are: true if
-    /// the option is useless, the option's name, and the reason.
+    /// Reports useless options: calls `add(is_useless, name, reason)` for each option that other options can
+    /// make useless.
     pub(super) fn without_effect(&self, base: &Integrator, add: &mut impl FnMut(bool, &str, &str)) {
         let is_cached = self.is_cached(base);
         let not_cached = "without --irradiance-cache on";

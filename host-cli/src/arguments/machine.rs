@@ -44,14 +44,13 @@ const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
 const TASKS: RangeInclusive<u32> = 1..=65_536;
 
 impl RateOptions {
-    /// Nominal machine, with the rates of these options.
+    /// Nominal machine, but with the bandwidth and the arithmetic rate of these options.
     pub(crate) fn machine(&self) -> Machine {
         Machine { bandwidth: 1e9 * self.bandwidth, flops: 1e9 * self.flops, ..Machine::NOMINAL }
     }
 }
 
 impl MachineOptions {
-    /// Machine with these options.
     pub(crate) fn machine(&self) -> Machine {
         Machine { latency: self.latency / 1e9, tasks: self.tasks, ..self.rates.machine() }
     }

@@ -77,8 +77,8 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// Text of `--version`: versions of the program, of the protocol and of the card image's layout; system; and
-/// the kinds of links in this build.
+/// Text of `--version`: the versions of the program, of the protocol and of the card image's memory layout;
+/// the operating system and architecture; and the kinds of links to cards in this build.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let links = if cfg!(unix) { "serial, tcp, unix, pty" } else { "serial, tcp" };
     format!(
@@ -102,8 +102,8 @@ impl Command {
 }
 
 impl Arguments {
-    /// Parses the arguments of the process. If they are invalid, ends the process with a message, in which
-    /// they are escaped.
+    /// Parses the arguments of the process. If they are invalid, prints a message with unprintable characters
+    /// escaped, and ends the process.
     pub(crate) fn parse_printably() -> Self {
         let given = of_scene_alone(std::env::args_os().collect());
         Self::try_parse_from(&given).unwrap_or_else(|error| {
@@ -311,7 +311,7 @@ mod tests {
         words.fold(command, |command, word| command.find_subcommand(word).expect(name).clone())
     }
 
-    /// Returns whether a command, or every command below it, takes an option `-o` or `--name`.
+    /// Returns whether `command`, or each of its subcommands, takes `option`: `-o` or `--name`.
     fn takes(command: &clap::Command, option: &str) -> bool {
         let is_it = |argument: &clap::Arg| match option.strip_prefix("--") {
             Some(long) => argument.get_long() == Some(long),

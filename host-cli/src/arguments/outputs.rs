@@ -58,8 +58,8 @@ impl OutputOptions {
         self.resume
     }
 
-    /// Returns the options with a PNG beside the scene file as the output, whose name has a run of `#` if
-    /// there are frames. `None` if an output is stated.
+    /// Returns these options with the default output, a PNG beside the scene file and named like it. If
+    /// `has_frames`, the name has a run of `#` for the frame's number. `None` if an output is stated.
     pub(crate) fn beside(&self, scene: &Path, has_frames: bool) -> Option<Self> {
         if !self.pictures.is_empty() {
             return None;
@@ -70,7 +70,8 @@ impl OutputOptions {
         Some(Self { pictures: vec![PictureOutput { path, format: PictureFormat::Png }], ..self.clone() })
     }
 
-    /// Settings of the file of finished tiles; `None` if the picture goes to standard output.
+    /// Settings of the file that keeps finished tiles until the picture is written; `None` if the picture
+    /// goes to standard output.
     pub(super) fn partial(&self) -> Option<PartialSettings> {
         self.main()?.file()?;
         Some(PartialSettings { path: self.partial_path(), resume: self.resume })
@@ -83,10 +84,10 @@ impl OutputOptions {
         name.into()
     }
 
-    /// Returns the options with the paths of a frame.
+    /// Returns these options with the frame's number in place of the `#` in each output path.
     ///
     /// # Errors
-    /// The first path without a run of `#`.
+    /// Returns the first path that has no `#`.
     pub(crate) fn of_frame(&self, frame: u32) -> Result<Self, &Path> {
         let mut outputs = self.clone();
         for (output, pattern) in outputs.pictures.iter_mut().zip(&self.pictures) {
@@ -108,8 +109,7 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
-    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
-    /// useless, the option's name, and the reason.
+    /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
         add(self.tone.exposure.is_some() && no_png, "--exposure", "without -o OUT.png");
@@ -127,8 +127,8 @@ impl OutputOptions {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 
-    /// Picture whose file name gives the names of the partial file and of the picture on a display server:
-    /// the first EXR, else the first picture.
+    /// Main picture: the first EXR, else the first picture. Its file name is used for the partial file and
+    /// for the picture on a display server.
     pub(crate) fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
         exr.or(self.pictures.first())

@@ -47,14 +47,13 @@ pub(super) enum MaxDistance {
 }
 
 impl PhotonOptions {
-    /// Adds to `others` which settings of photons are stated.
+    /// Returns `others`, with flags for the photon settings that these options state.
     pub(super) fn stated(&self, others: Stated) -> Stated {
         let [photons, caustic_photons] = [self.photons, self.caustic_photons].map(|count| count.is_some());
         Stated { photons, caustic_photons, neighbors: self.neighbors.is_some(), ..others }
     }
 
-    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
-    /// useless, the option's name, and the reason.
+    /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.
     pub(super) fn without_effect(
         &self,
         is_specular: bool,
@@ -71,7 +70,7 @@ impl PhotonOptions {
         add(self.caustic_neighbors.is_some() && (!is_specular || is_off), "--caustic-neighbors", no_map);
     }
 
-    /// Settings of these options. `base` supplies those that are not stated.
+    /// Returns the settings that these options state. Settings that are not stated are those of `base`.
     pub(super) fn settings(&self, base: &PhotonMaps) -> PhotonMaps {
         PhotonMaps {
             count: self.photons.unwrap_or(base.count),

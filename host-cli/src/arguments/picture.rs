@@ -8,7 +8,7 @@ use photoncard_driver::scene::Camera;
 
 use super::choice::choice;
 
-/// Default length of the longer side, pixels.
+/// Default length of the picture's longer side, pixels.
 const SIDE: u32 = 512;
 
 /// Aspect ratio of a picture whose height alone is stated, if the camera has none.
@@ -25,7 +25,8 @@ enum Size {
 }
 
 impl Size {
-    /// Width and height of the picture. The camera's aspect ratio supplies the one that is not stated.
+    /// Returns the picture's width and height, pixels. One that is not stated follows from the camera's
+    /// aspect ratio.
     fn of(self, camera: Option<&Camera>) -> (u32, u32) {
         let aspect = camera.and_then(|camera| camera.aspect);
         match self {
@@ -87,7 +88,7 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    /// Settings of these options. `base` supplies those that are not stated.
+    /// Returns the settings that these options state. Settings that are not stated are those of `base`.
     pub(super) fn settings(&self, base: &Picture) -> Picture {
         let Self { size, crop, camera, camera_at, look_at, fov, aov: _, filter } = self;
         let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
@@ -104,18 +105,17 @@ impl PictureOptions {
         }
     }
 
-    /// Returns whether the size of the picture is stated.
     pub(crate) fn states_size(&self) -> bool {
         self.size.is_some()
     }
 
-    /// Layers that the picture stores.
+    /// Layers that the picture stores besides radiance.
     pub(crate) fn layers(&self) -> Layers {
         self.aov.clone().unwrap_or_default()
     }
 
     /// Gives the picture the camera's aspect ratio, unless width and height are both stated. Returns a notice
-    /// if these have another ratio.
+    /// if the stated ratio differs from the camera's.
     pub(crate) fn fit(&self, camera: &Camera, picture: &mut Picture) -> Option<String> {
         let size = self.size.unwrap_or(Size::Longer(SIDE));
         (picture.width, picture.height) = size.of(Some(camera));
@@ -151,7 +151,7 @@ fn size(text: &str) -> Result<Size, String> {
     })
 }
 
-/// Length of the longer side for a percentage of [`SIDE`], at least one pixel.
+/// Returns `percent` of the default longer side, [`SIDE`], rounded to pixels; at least 1.
 fn percent_of_side(percent: &str) -> Option<u32> {
     let percent = percent.parse().ok().filter(|percent: &f32| *percent > 0.0 && percent.is_finite())?;
     Some(((SIDE as f32 * percent / 100.0 + 0.5) as u32).max(1))

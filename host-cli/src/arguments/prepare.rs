@@ -66,18 +66,18 @@ pub(crate) struct PrepareOptions {
 }
 
 impl PrepareOptions {
-    /// Returns the address of the cards that will render, as if they were emulated.
+    /// Returns an emulated card with the kind and the memory of the cards that will render.
     fn cards(&self) -> CardAddress {
         self.memory.of(CardAddress::emulated(self.chip.or(self.card)))
     }
 
-    /// Returns the budget of the cards that will render.
+    /// Returns the capacities of the cards that will render.
     pub(crate) fn budget(&self) -> Budget {
         let budget = self.chip.or(self.card).budget();
         Budget { dram_bytes: self.cards().dram_bytes(), ..budget }
     }
 
-    /// Returns which of the settings that a quality chooses are stated.
+    /// Returns which settings the options state, among those that `--quality` would choose.
     pub(crate) fn stated(&self) -> Stated {
         self.photons.stated(self.integrator.stated())
     }
@@ -87,8 +87,8 @@ impl PrepareOptions {
         Finish::new(self.denoise)
     }
 
-    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
-    /// may change.
+    /// Returns the settings that these options state. Settings that are not stated are the defaults of
+    /// `--quality`; a pilot render may change these later.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {

@@ -1,4 +1,5 @@
-//! Steps of a farm's job that take a given option of `photoncard render`, and the option `--prepared`.
+//! The option `--prepared`, and the steps of a render farm's job that take each option of `photoncard
+//! render`.
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Args, Command, Id};
@@ -9,7 +10,7 @@ use super::photons::PhotonOptions;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 
-/// Steps of a farm's job that take an option of `photoncard render`.
+/// Steps of a render farm's job whose commands take a given option of `photoncard render`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// The preparation: the prepared scene depends on the option.
@@ -72,7 +73,7 @@ pub(crate) struct PreparedOption {
     pub(crate) prepared: bool,
 }
 
-/// Adds a remedy to the error that `--prepared` excludes an option of `photoncard prepare`.
+/// Adds a remedy to `error` if it says that `--prepared` excludes an option of `photoncard prepare`.
 pub(super) fn with_remedy(mut error: Error) -> Error {
     let names = |option: &str| {
         [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {

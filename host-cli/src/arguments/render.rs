@@ -75,17 +75,17 @@ pub(crate) struct RenderOptions {
     pub(crate) progress: ProgressForm,
 }
 
-/// Settings before a pilot render, which then chooses those that are not stated.
+/// Settings of a render before its pilot render, which chooses the settings that are not stated.
 pub(crate) struct Unfitted {
     pub(crate) settings: RenderSettings,
-    /// Settings that are stated or taken from kept samples.
+    /// Settings that the pilot must not choose: options state them, or kept samples have them.
     pub(crate) stated: Stated,
-    /// True if an earlier render has kept samples that this one adds to.
+    /// True if this render adds to samples that an earlier render has kept.
     pub(crate) are_kept: bool,
 }
 
 impl RenderOptions {
-    /// Returns which of the settings that a quality chooses are stated.
+    /// Returns which settings the options state, among those that `--quality` would choose.
     pub(crate) fn stated(&self) -> Stated {
         self.photons.stated(self.integrator.stated())
     }
@@ -95,8 +95,8 @@ impl RenderOptions {
         self.integrator.planned_spp.is_some()
     }
 
-    /// Returns the settings before a pilot. If the render adds to kept samples, the settings of these samples
-    /// replace those of `settings` that no option states.
+    /// Returns the settings before the pilot render. If the render adds to kept samples, the settings that no
+    /// option states are those of these samples.
     ///
     /// # Errors
     /// If the file of kept samples cannot be read.
@@ -108,7 +108,8 @@ impl RenderOptions {
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 
-    /// Chooses settings for a scene by a pilot; `None` if no setting is left to choose.
+    /// Runs a pilot render of the scene to choose the settings that are not stated. Returns `None` if there
+    /// is no setting to choose.
     ///
     /// # Errors
     /// As [`Quality::fit`].
@@ -133,8 +134,8 @@ impl RenderOptions {
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Returns the aim of a picture's passes. The time in it is that of `aim` less the expected time of a
-    /// denoiser and less `elapsed`, the time that was spent before the passes.
+    /// Returns the time and noise at which a picture's passes end. The time is that of `aim`, less the
+    /// expected time of a denoiser, and less `elapsed`, the time spent before the passes.
     pub(crate) fn aim_of_passes(&self, aim: Aim, settings: &RenderSettings, elapsed: Duration) -> Aim {
         let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);
@@ -155,13 +156,13 @@ impl RenderOptions {
         }
     }
 
-    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
-    /// may change.
+    /// Returns the settings that these options state. Settings that are not stated are the defaults of
+    /// `--quality`; a pilot render may change these later.
     pub(crate) fn settings(&self) -> RenderSettings {
         self.settings_of(self.quality)
     }
 
-    /// [`Self::settings`] with another quality.
+    /// Returns [`Self::settings`] with `quality` in place of the quality that the options state.
     pub(crate) fn settings_of(&self, quality: Quality) -> RenderSettings {
         let cards = self.cards.settings();
         let base = quality.settings_for(self.outputs.finish());
@@ -175,19 +176,21 @@ impl RenderOptions {
         }
     }
 
-    /// Returns whether a pilot decides if photons are guided to surfaces that matter to the camera's
-    /// picture.
+    /// Returns whether a pilot render decides between photons for the whole scene and photons guided to the
+    /// camera.
     pub(crate) fn leaves_cameras_open(&self) -> bool {
         self.photons_for() == PhotonsFor::Auto
     }
 
-    /// Guiding of the photons: [`PhotonsFor::Scene`] if several pictures share them.
+    /// Value of `--photons-for`, but [`PhotonsFor::Scene`] for frames and prepared scenes: their pictures
+    /// share photons.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
         if is_shared { PhotonsFor::Scene } else { self.photons_for }
     }
 
-    /// Settings of the partial file and of the display, which are written while a picture is rendered.
+    /// Settings of the partial file and of the display server, which receive each finished tile during a
+    /// render.
     pub(crate) fn tile_outputs(&self, outputs: &OutputOptions) -> TileOutputs {
         TileOutputs {
             // With `--time` or `--noise` a stopped render writes its picture, and no partial file.

@@ -1,4 +1,4 @@
-//! Options of pictures by passes (`--time`, `--noise`), and of kept samples.
+//! Options of renders that add passes of samples up to an aim (`--time`, `--noise`), and of kept samples.
 
 use std::time::Duration;
 
@@ -28,12 +28,11 @@ pub(crate) struct SampleOptions {
     pub(crate) keep_samples: bool,
 }
 
-/// Ids of options that exclude `--time` and `--noise`: they concern the number of samples, the memory or the
-/// tiles of a single pass.
+/// Ids of the options that cannot be combined with `--time` or `--noise`.
 const NOT_BY_PASSES: [&str; 6] = ["spp", "resume", "cache", "trace", "verify", "frames"];
 
 impl SampleOptions {
-    /// Time or noise that ends the passes; `None` for a picture with a stated number of samples.
+    /// Time or noise at which the passes end; `None` without `--time` and `--noise`.
     pub(crate) fn aim(&self) -> Option<Aim> {
         let Self { time, noise, keep_samples: _ } = *self;
         (time.is_some() || noise.is_some()).then_some(Aim { time, noise })

@@ -52,8 +52,7 @@ pub(crate) struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
-    /// useless, the option's name, and the reason.
+    /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.
     pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });

@@ -43,8 +43,7 @@ pub(crate) struct PartOptions {
 }
 
 impl ScheduleOptions {
-    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
-    /// useless, the option's name, and the reason.
+    /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let Self { order, bins, queue, in_flight, tile: _ } = self;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());
@@ -54,7 +53,6 @@ impl ScheduleOptions {
         add(in_flight.is_some() && !order.has_queue(), "--in-flight", &no_queue);
     }
 
-    /// Settings of these options.
     pub(super) fn settings(&self) -> Schedule {
         Schedule {
             tile: self.tile,

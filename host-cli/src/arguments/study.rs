@@ -61,7 +61,6 @@ impl Selection {
         })
     }
 
-    /// Selected studies.
     pub(crate) fn studies(self) -> Vec<Study> {
         match self {
             Self::One(study) => vec![study],

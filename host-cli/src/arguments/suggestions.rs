@@ -1,4 +1,4 @@
-//! Remedies for options of other renderers.
+//! Hints in error messages on this program's equivalents of other renderers' options.
 
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
@@ -12,8 +12,8 @@ const PICTURE: &[&str] = &["render", "prepare", "view", "study sweep", "farm"];
 /// Commands that write pictures in several formats.
 const WRITE: &[&str] = &["render", "merge", "farm"];
 
-/// Options of other renderers, with a remedy that names the options of this program. Only the commands in
-/// `commands` have the latter options; an empty list means that the remedy is valid for all commands.
+/// Options of other renderers with a remedy, a text that names this program's equivalent options. `commands`
+/// lists the commands that have these equivalents; an empty list means all commands.
 pub(super) struct Word {
     options: &'static [&'static str],
     pub(super) remedy: &'static str,
@@ -123,12 +123,12 @@ pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[Strin
     error
 }
 
-/// Returns the names in `commands` of commands that this build contains.
+/// Returns those of `commands` that this build contains.
 pub(super) fn built(commands: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
     commands.iter().copied().filter(|command| cfg!(feature = "study") || !command.starts_with("study"))
 }
 
-/// Path of the command without the program's name: `render`, `study sweep`.
+/// Returns the names of the command and subcommand in `given`, joined by blanks: `render`, `study sweep`.
 pub(super) fn command_of(program: Command, given: &[String]) -> String {
     let mut command = program;
     let mut names = Vec::new();
@@ -141,7 +141,7 @@ pub(super) fn command_of(program: Command, given: &[String]) -> String {
 }
 
 impl Word {
-    /// Returns whether the remedy is for this command or for one above it.
+    /// Returns whether the remedy applies to `command` itself or to a command of which it is a subcommand.
     fn is_of(&self, command: &str) -> bool {
         let is_within = |of: &&str| {
             command.strip_prefix(*of).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))

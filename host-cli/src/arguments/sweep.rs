@@ -66,11 +66,11 @@ struct SweepSettings {
     caches: Vec<CacheSettings>,
 }
 
-/// Name of the axis whose values are caches.
+/// Name of the option `--cache` in `--vary`.
 pub(crate) const CACHE: &str = "cache";
 
 impl SweepArguments {
-    /// Axes of the sweep: those of `--vary`, and one of the caches if `--cache` states several.
+    /// Options that the sweep varies: those of `--vary`, and the caches if `--cache` is stated several times.
     pub(crate) fn axes(&self) -> Vec<Axis> {
         let caches = &self.settings.caches;
         let several = (caches.len() > 1).then(|| Axis {
@@ -80,8 +80,8 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
-    /// Point of the sweep that has the settings of these options and the first of the stated caches. `name`
-    /// is the name of the scene.
+    /// Measurement with the settings of these options and the first of the stated caches; the sweep varies
+    /// this point. `name` is the name of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
             &self.settings;
@@ -106,7 +106,6 @@ impl SweepArguments {
         Point { scene, assignments, settings, is_along_curve: false, task }
     }
 
-    /// Options of the picture.
     pub(crate) fn picture(&self) -> &PictureOptions {
         &self.settings.picture
     }
@@ -132,7 +131,7 @@ fn axis(text: &str) -> Result<Axis, String> {
     Ok(Axis { name: name.to_owned(), values })
 }
 
-/// Checks that each value of `--vary cache=` is a whole cache setting, and not a part of one cut at a comma.
+/// Checks that each value of `--vary cache=` is a complete cache setting, not a piece of one cut at a comma.
 fn check_parts(values: &[String]) -> Result<(), String> {
     let part = |value: &String| value.split_once('=').map(|(part, _)| part.to_owned());
     let parts: Vec<_> = values.iter().map(part).collect();

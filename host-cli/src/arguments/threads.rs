@@ -1,9 +1,8 @@
 //! Parser of thread counts.
 
-/// Maximum number of threads. A start of more threads than the system can hold would end the process.
+/// Maximum number of threads. Without a limit, a number that the system cannot start would end the process.
 const MAX_THREADS: usize = 1024;
 
-/// Parses a number of threads.
 pub(super) fn threads(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
     count

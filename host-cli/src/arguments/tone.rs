@@ -29,7 +29,6 @@ pub(super) enum Exposure {
 }
 
 impl ToneOptions {
-    /// Tone mapping with these options.
     pub(crate) fn mapping(&self) -> ToneMapping {
         ToneMapping {
             exposure: match self.exposure {

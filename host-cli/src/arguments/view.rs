@@ -59,18 +59,18 @@ pub(crate) struct ViewOptions {
 }
 
 impl ViewOptions {
-    /// Returns which of the settings that a quality chooses are stated.
+    /// Returns which settings the options state, among those that `--quality` would choose.
     pub(crate) fn stated(&self) -> Stated {
         self.photons.stated(self.integrator.stated())
     }
 
-    /// Returns whether the settled picture is denoised.
+    /// Returns whether the final picture is denoised.
     pub(crate) fn finish(&self) -> Finish {
         Finish::new(self.denoise)
     }
 
-    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
-    /// may change.
+    /// Returns the settings that these options state. Settings that are not stated are the defaults of
+    /// `--quality`; a pilot render may change these later.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {
@@ -84,7 +84,8 @@ impl ViewOptions {
     }
 }
 
-/// Parses the address of the page. The only name is `localhost`: a look-up of others may take long.
+/// Parses the address of the page: an IP address or `localhost`, and a port. The look-up of other host names
+/// may take long.
 fn listen(text: &str) -> Result<SocketAddr, String> {
     let local = || Some((Ipv4Addr::LOCALHOST, text.strip_prefix("localhost:")?.parse().ok()?).into());
     let address = text.parse().ok().or_else(local);

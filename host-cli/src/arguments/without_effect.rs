@@ -6,7 +6,7 @@ use photoncard_driver::scene::Scene;
 use super::render::RenderOptions;
 
 impl RenderOptions {
-    /// Sentences about the options without effect on a render of `scene`.
+    /// Returns a sentence for each option that has no effect on a render of `scene`.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
         let Self { picture, outputs, .. } = self;
         let base = self.quality.settings_for(outputs.finish()).integrator;

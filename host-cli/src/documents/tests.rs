@@ -57,7 +57,7 @@ fn sentence(text: String) -> String {
     if text.ends_with(['.', ':']) { text } else { text + "." }
 }
 
-/// Forms of an argument, such as `-o, --output OUT.exr`.
+/// Names and value of an argument, as help texts show them: `-o, --output OUT.exr`.
 fn forms(argument: &Arg) -> String {
     let values = argument.get_value_names().unwrap_or_default().join(" ");
     let short = argument.get_short().map(|short| format!("-{short}"));
@@ -67,7 +67,7 @@ fn forms(argument: &Arg) -> String {
     if takes_values { format!("{names} {values}").trim().to_owned() } else { names }
 }
 
-/// List item of an argument: forms, help, default and possible values.
+/// Markdown list item of an argument: names, help, default and possible values.
 fn item(argument: &Arg) -> String {
     let help = argument.get_long_help().or(argument.get_help()).expect("the argument has help").to_string();
     let mut parts: Vec<_> = help.split("\n\n").map(|paragraph| sentence(prose(&paragraph))).collect();

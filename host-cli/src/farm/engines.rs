@@ -31,7 +31,7 @@ esac
     )
 }
 
-/// Replaces control characters, such as line ends, by `?`: the text becomes one line of a comment.
+/// Returns `text` as one line for a comment: control characters, such as line ends, become `?`.
 fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }

@@ -36,7 +36,8 @@ impl Job {
     /// Creates a job from options. `given` are the arguments from which they were parsed.
     ///
     /// # Errors
-    /// If an option is not allowed in a job, a name is not text, or a job cannot render the frames.
+    /// If an option or an output is not allowed in a job, a name is not UTF-8, or the frames are not
+    /// consecutive.
     pub(super) fn new(options: &FarmOptions, given: impl Iterator<Item = OsString>) -> Result<Self, Failure> {
         let pictures = &options.render.outputs.pictures;
         if pictures.is_empty() || pictures.iter().any(|picture| picture.file().is_none()) {

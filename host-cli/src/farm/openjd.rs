@@ -34,8 +34,8 @@ fn name(job: &Job) -> String {
     format!("photoncard {name}")
 }
 
-/// Step that renders all tasks. One `photoncard` process renders a chunk of frames; parts have one process
-/// each, one after another.
+/// Step that renders all parts. With frames, one `photoncard` process renders one part of each frame in a
+/// chunk. Without frames, each part has its own process; the parts of a chunk follow each other.
 fn render(job: &Job) -> Value {
     let chunks = json!({"defaultTaskCount": 1, "rangeConstraint": "CONTIGUOUS"});
     let parts = format!("1-{}", job.parts);
@@ -57,7 +57,7 @@ fn render(job: &Job) -> Value {
     step
 }
 
-/// Step `name`, which runs the job's script with the words `name` and `arguments`.
+/// Step `name`, which runs the job's script with the arguments `name` and `arguments`.
 fn step(job: &Job, name: &str, arguments: &[&str]) -> Value {
     let words = ["{{Task.File.Job}}", name].into_iter().chain(arguments.iter().copied());
     json!({

@@ -1,11 +1,11 @@
-//! Steps of a job as functions of a POSIX shell. Each may be repeated, even while an earlier run is active or
-//! after it was killed.
+//! Steps of a job as functions of a POSIX shell. A step may be run again at any time, even while an earlier
+//! run of it is active, or after that run was killed.
 
 use super::job::{Frames, Job};
 use crate::shell::quoted;
 
-/// Returns the definitions of the shell functions `prepare`, `part`, `merge` and `task`, which work in the
-/// job's home. `task N` renders task N, from 0. `extra` is text such as ` --progress openjd`, which is
+/// Returns the definitions of the shell functions `prepare`, `part`, `merge` and `task`, to be called in the
+/// folder `job.home`. `task N` renders task N, from 0. `extra` is text, such as ` --progress openjd`, that is
 /// appended to each `photoncard` command.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;

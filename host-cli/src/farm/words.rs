@@ -20,7 +20,7 @@ const OF_NO_JOB: [&str; 12] = [
     "progress",
 ];
 
-/// Words of a command line, sorted by step.
+/// Words of a command line, sorted by the steps of a farm's job that take them.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Words {
     pub(super) scene: Vec<String>,
@@ -35,10 +35,10 @@ pub(super) struct Words {
 }
 
 impl Words {
-    /// Sorts the arguments of `command`.
+    /// Sorts `given`, arguments of `command`, by the steps of the job that take them.
     ///
     /// # Errors
-    /// Name of an option that is not allowed in a job.
+    /// Returns the name of an option that is not allowed in a job.
     pub(super) fn new(given: impl IntoIterator<Item = String>, command: &Command) -> Result<Self, String> {
         let mut words = Self::default();
         let mut given = given.into_iter();
@@ -67,8 +67,8 @@ impl Words {
         Ok(words)
     }
 
-    /// Returns the lists that take the words of an option: none for an option of the job itself, such as
-    /// `--parts`; `None` for an option that is not allowed in a job.
+    /// Returns the lists to which the words of an option are appended; no list for an option of the job
+    /// itself, such as `--parts`. `None` for an option that is not allowed in a job.
     fn rooms(&mut self, option: &Arg) -> Option<Vec<&mut Vec<String>>> {
         if OF_NO_JOB.contains(&option.get_id().as_str()) {
             return None;

@@ -33,8 +33,8 @@ pub(crate) struct Progress {
     percent: Option<Percent>,
 }
 
-/// Without a terminal, a phase before the tiles prints nothing but its last line during this time from its
-/// start, seconds.
+/// Time, seconds, in which a phase before the tiles prints only its last line. It starts with the phase, and
+/// applies without a terminal.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {
@@ -46,7 +46,7 @@ struct Display {
     /// Number of tiles that an earlier render has finished.
     resumed: u64,
     on_terminal: bool,
-    /// Tenths of the phase that the last printed line states, without a terminal.
+    /// Tenths of the phase that were finished at the last printed line; used without a terminal.
     told: u64,
 }
 
@@ -77,7 +77,7 @@ impl Progress {
         }
     }
 
-    /// [`Self::start`] for a sequence of frames. Without a terminal, a frame is reported only at its end.
+    /// Starts the display for a sequence of frames. Without a terminal, nothing is shown during a frame.
     pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
         Self::start(quiet || !std::io::stderr().is_terminal(), cards)
     }
@@ -214,12 +214,12 @@ impl Display {
     }
 }
 
-/// Time after a signal within which another one counts as the same: `timeout` sends each signal to the
-/// process and to its group.
+/// Time after the first signal within which a further signal does not end the process: `timeout` sends each
+/// signal both to the process and to its group.
 const REPETITIONS: Duration = Duration::from_millis(300);
 
-/// Returns a flag that SIGINT, SIGTERM and, on Linux, SIGHUP set. SIGINT or SIGTERM more than [`REPETITIONS`]
-/// later ends the process.
+/// Returns a flag that becomes true at SIGINT, SIGTERM or, on Linux, SIGHUP. A further SIGINT or SIGTERM ends
+/// the process if it comes more than [`REPETITIONS`] later.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let [stopped, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
     let flags = (stopped.clone(), ends.clone());
@@ -273,7 +273,6 @@ struct Percent {
 }
 
 impl Percent {
-    /// Creates a progress of zero percent.
     fn of(phase: Phase) -> Self {
         Self { phase, told: Mutex::default() }
     }

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 /// Estimates the remaining time of pieces of work that `workers` process in parallel.
 ///
-/// Each worker processes one piece after another, so that the sum of the last completion times of all workers
-/// is the time spent on finished pieces. `n` is the number of finished pieces, `N` that of all pieces, and
+/// Each worker processes one piece after another. The last completion times of all workers therefore sum to
+/// the time spent on finished pieces. Let `n` be the number of finished pieces, `N` that of all pieces, and
 /// `t` the mean of the last `min(n, workers)` completion times. The work ends at about `t N / max(n,
 /// workers)`. Between completions the estimate counts down, until a piece takes longer than the mean. Pieces
 /// that were finished before the start count as done, but not for the speed.
@@ -52,8 +52,8 @@ impl Remaining {
             mean * (finished + left) as f64 / finished.max(self.workers as u64) as f64
         };
         let known = mean(self.completions.iter().copied());
-        // In `overdue`, a next piece takes a worker's place in the mean: it is finished at `now` at the
-        // earliest.
+        // `overdue` is the mean with one more piece, which is finished at `now` at the earliest. This piece
+        // replaces the oldest completion if each worker has one.
         let skipped = (self.completions.len() + 1).saturating_sub(self.workers);
         let overdue = mean(self.completions.iter().copied().skip(skipped).chain([now]));
         let expected = end(known, finished, left).max(end(overdue, finished + 1, left - 1));
@@ -72,9 +72,8 @@ mod tests {
 
     use super::*;
 
-    /// Simulates a render of tiles that cost `costs` seconds, each taken in this order by the first of
-    /// `workers` that is free. Returns (time, estimate, true remaining time) at ten times between each two
-    /// completions.
+    /// Simulates `workers` that render tiles with these `costs`, seconds: the first free worker takes the
+    /// next tile. Returns (time, estimate, true remaining time) at ten times between each two completions.
     fn estimates(costs: &[f64], workers: usize, before: u64) -> Vec<(f64, Option<f64>, f64)> {
         let mut free = vec![0.0_f64; workers];
         let mut ends: Vec<f64> = Vec::new();
@@ -106,9 +105,9 @@ mod tests {
         (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
     }
 
-    /// Checks that the estimate, after a fifth of the time and before the last `tail` seconds, has a relative
-    /// error of at most `share`, and that each estimate differs by at most the same share from the estimate
-    /// before, counted down to the same time.
+    /// Checks the estimates after a fifth of the time and before the last `tail` seconds. Each must have a
+    /// relative error of at most `share`. Each must also differ by at most `share`, relatively, from the
+    /// previous estimate less the time since then.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;

@@ -33,7 +33,7 @@ pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     }
 }
 
-/// Message about a picture of pixels (radiance, depth); `None` if the picture is not dark.
+/// Returns the message about a picture with these pixels (radiance, depth); `None` if it is not dark.
 fn line(
     all: impl Iterator<Item = ([f32; 3], f32)>,
     Circumstances { lacks_world, is_outside }: Circumstances,

@@ -1,4 +1,4 @@
-//! Message about the end of a picture by passes.
+//! Message about the end of a render with `--time` or `--noise`, which adds passes of samples up to an aim.
 
 use photoncard_driver::render::{Aim, Ending, Statistics};
 use serde_json::Value;
@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::arguments::RenderOptions;
 use crate::console::say;
 
-/// Result of a picture by passes.
+/// Result of a render with `--time` or `--noise`.
 pub(super) struct End {
     pub(super) aim: Aim,
     pub(super) noise: Option<f64>,
@@ -51,8 +51,8 @@ fn percent(share: f64) -> String {
     format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Options that render the picture of `statistics` in one pass, once `--time` and `--noise` are left out.
-/// `is_fitted` is true if a pilot has chosen settings.
+/// Returns the options that replace `--time` and `--noise` to render the picture of `statistics` in one pass.
+/// `is_fitted` is true if a pilot render has chosen settings.
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let is_timed = is_fitted && options.samples.aim().is_some_and(|aim| aim.time.is_some());

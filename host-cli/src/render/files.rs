@@ -44,8 +44,7 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     }
 }
 
-/// Checks that standard output is used for only one of picture, statistics and progress, and that a picture
-/// does not go to a terminal.
+/// Checks that a picture on standard output is the only output there, and that it does not go to a terminal.
 pub(crate) fn check_standard_output(
     pictures: &[PictureOutput],
     stats: Option<&TextOutput>,
@@ -64,7 +63,8 @@ pub(crate) fn check_standard_output(
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Checks that finished tiles, if they are to be kept, have a file beside the picture's.
+/// Checks that the picture is a file if `--resume` or `--keep-samples` is given: finished tiles are kept
+/// beside it.
 fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     let is_piped = outputs.main().is_some_and(|picture| picture.file().is_none());
     if !is_piped || !(outputs.resume || options.samples.keep_samples) {
@@ -75,8 +75,8 @@ fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Fa
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Returns the options of a picture beside the scene; `None` if a picture is stated or a part is rendered. An
-/// existing file of that name is replaced only if photoncard wrote it.
+/// Returns the outputs if no picture is stated: a PNG beside the scene file. `None` if a picture is stated or
+/// a part is rendered. An existing file of that name is replaced only if photoncard wrote it.
 pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
     let has_frames = options.frames.numbers().is_some();
     let outputs = options.outputs.beside(&options.scene.path, has_frames);
@@ -149,7 +149,7 @@ pub(super) fn write_statistics(
     }
 }
 
-/// Denoiser, if it is asked for. Open Image Denoise is loaded once in a process.
+/// Returns the denoiser if `is_asked`, else `None`. Open Image Denoise is loaded once per process.
 pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Failure> {
     static FOUND: OnceLock<Denoiser> = OnceLock::new();
     if !is_asked {
@@ -176,7 +176,7 @@ pub(crate) fn denoised(
     radiance.map_err(|error| Failure::work_error(&error))
 }
 
-/// Content of a picture's file besides the film, for each format.
+/// Data that a picture's file has besides the film. Each format uses some of them.
 pub(crate) struct Form {
     /// Layers of an EXR.
     pub(crate) layers: Layers,
@@ -186,7 +186,7 @@ pub(crate) struct Form {
     pub(crate) tone: ToneMapping,
     /// Denoised radiance: a layer of an EXR, and what a PNG shows.
     pub(crate) denoised: Option<Vec<[f32; 3]>>,
-    /// Head of a part; `None` for a whole picture.
+    /// Header of a file with one part of a picture; `None` for a whole picture.
     pub(crate) part: Option<PartHead>,
 }
 

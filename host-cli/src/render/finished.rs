@@ -15,7 +15,7 @@ use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOption
 /// Settings that a render finds itself when they are not stated, and then writes into the provenance.
 const FOUND: [&str; 2] = ["max-distance", "view"];
 
-/// Returns whether frames are resumed and all files of this one exist.
+/// Returns whether `--resume` is given and all files of this frame exist.
 pub(super) fn may_be(outputs: &OutputOptions) -> bool {
     let stats = outputs.stats.as_ref().and_then(TextOutput::path);
     let mut files = outputs.pictures.iter().map(|picture| &*picture.path).chain(stats);
@@ -73,7 +73,8 @@ fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     outputs.pictures.iter().find(|picture| !is_intact(picture)).map(|picture| &*picture.path).or(stats)
 }
 
-/// Provenance of an existing picture, if it has the layers and the sample type of the outputs.
+/// Provenance of an existing picture; `None` if its sample type, tone mapping or part is not that of the
+/// outputs.
 fn provenance(
     options: &RenderOptions,
     outputs: &OutputOptions,

@@ -61,11 +61,11 @@ pub(super) fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputO
 struct Sequence<'a> {
     options: &'a RenderOptions,
     moments: Moments<'a>,
-    /// Scene at rest, for which a quality chooses the settings; `None` once they are chosen.
+    /// Scene without animation, for which the quality chooses the settings; `None` once they are chosen.
     rest: Option<Scene>,
     renderer: Renderer,
     progress: Progress,
-    /// Time of reading the scene since the last frame's statistics, seconds.
+    /// Time spent on reading the scene since the statistics of the last frame, seconds.
     scene_seconds: f64,
 }
 
@@ -139,8 +139,8 @@ impl<'a> Sequence<'a> {
         Ok(())
     }
 
-    /// Renders the picture of the frame that the scene was moved to. The first call chooses the settings, for
-    /// the scene at rest.
+    /// Renders the current frame of the scene. The first call chooses the settings, for the scene without
+    /// animation.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
         let Self { options, moments, rest, renderer, progress, .. } = self;
         let scene = moments.scene();

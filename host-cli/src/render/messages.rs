@@ -135,9 +135,9 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// Messages about a pilot's results for settings that no option states: the ratio of the squared errors with
-/// photons that are guided to the camera and without; and numbers of photons or gather rays that the bounds
-/// of the quality or of `--time` have reduced.
+/// Messages about a pilot render's results for settings that no option states. One states the squared error
+/// with photons guided to the camera, as a ratio to that with as many unguided photons. Others state that the
+/// bounds of the quality or of `--time` have reduced the number of photons or of gather rays.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
@@ -187,7 +187,8 @@ fn lights(scene: &Scene) -> String {
     format!("light of {}", kinds.into_iter().flatten().collect::<Vec<_>>().join(" and "))
 }
 
-/// Prints the files of a picture, and its time with its samples or, for a frame, with its phases.
+/// Prints a picture's files and its time. Adds the number of samples or, for a frame, the times of its
+/// phases.
 pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
     if let Some(memory) = &statistics.memory {

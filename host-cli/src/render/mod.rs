@@ -46,7 +46,7 @@ pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
     videos.iter().try_for_each(|video| video.write(options))
 }
 
-/// Renders one picture, of the scene at rest.
+/// Renders one picture of the scene, without animation.
 fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let mut settings = options.settings();
     files::check(options, &options.outputs)?;

@@ -13,14 +13,14 @@ pub(super) struct Moments<'a> {
     options: &'a SceneOptions,
     frames: &'a FrameOptions,
     input: Input,
-    /// Scene at the frame of the last call of `move_to`. Before the first call it is the scene at rest if
-    /// only cameras move, else an empty scene.
+    /// Scene at the frame of the last call of `move_to`. Before the first call, it is the scene without
+    /// animation if only cameras move, else an empty scene.
     scene: Scene,
     is_still: bool,
 }
 
 impl<'a> Moments<'a> {
-    /// Opens a scene for cards with `dram_bytes` bytes of memory. Also returns the scene at rest.
+    /// Opens a scene for cards with `dram_bytes` bytes of memory. Also returns the scene without animation.
     pub(super) fn open(
         options: &'a SceneOptions,
         frames: &'a FrameOptions,

@@ -34,17 +34,17 @@ fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Arguments of this process.
+/// Arguments of this process, without the program's name.
 pub(super) fn arguments() -> Vec<String> {
     std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Command that renders another part, by the arguments in the head of an existing one.
+/// Returns the command that renders `part`, from the arguments in the header of another part of the picture.
 pub(crate) fn command(head: &PartHead, part: Part) -> String {
     shell::command(with_part(head, part))
 }
 
-/// Arguments from a part's head, with another part and its file name, and with the head's frame alone.
+/// Returns the arguments in a part's header, changed to render `part`; of several frames, the header's alone.
 fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     let frame = head.settings.get("frame").map(ToString::to_string);
     let changed = |option: &str, value: &str| match option {
@@ -70,8 +70,8 @@ fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     words
 }
 
-/// Path of another part's file: the last number in the name that equals `part` is replaced, with its leading
-/// zeros. Without such a number, `other` is inserted before the suffix.
+/// Path of the file of part `other`, derived from that of `part`. In the name, the last number that equals
+/// `part` is replaced, with as many digits. Without such a number, `other` is inserted before the suffix.
 fn name_of(path: &Path, part: Part, other: Part) -> PathBuf {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut pieces: Vec<String> = Vec::new();

@@ -21,7 +21,7 @@ use crate::notices::{self, Uses};
 use crate::progress::Progress;
 use crate::{input, outputs};
 
-/// Prepares a scene, at rest or in frames, and writes it.
+/// Prepares a scene, without animation or for frames, and writes it.
 pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
     match options.frames.numbers() {
         None => prepare_rest(options),
@@ -107,7 +107,7 @@ impl<'a> Preparation<'a> {
         Ok(Self { options, settings, progress, said: OnceLock::new() })
     }
 
-    /// Chooses the settings of photons and integrator that are not stated, by a pilot with `scene`.
+    /// Runs a pilot render of `scene` to choose the settings of photons and integrator that no option states.
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
@@ -156,7 +156,7 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Metadata that renders of a prepared scene read: the quality, whether pictures will be denoised, and the
+/// Metadata of a prepared scene for later renders: the quality, whether pictures will be denoised, and the
 /// inputs with the settings that all frames share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);

@@ -80,7 +80,7 @@ struct OpenScene {
 }
 
 impl OpenScene {
-    /// Opens a prepared scene. `is_rest` is true if no frame is requested: a scene of frames is then refused.
+    /// Opens a prepared scene. `is_rest` is true if no frame is requested; a file of frames is then an error.
     fn open(options: &RenderOptions, path: PathBuf, is_rest: bool) -> Result<Self, Failure> {
         let start = Instant::now();
         let prepared = PreparedScene::open(&path).map_err(Failure::input)?;

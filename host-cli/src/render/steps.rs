@@ -1,4 +1,4 @@
-//! Steps of a render that a single picture and a frame share.
+//! Steps of a render that are the same for a single picture and for a frame.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Fit, Quality};
@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::flags::with_flags;
 use crate::progress::Progress;
 
-/// Prints where a failed render keeps its finished tiles, and writes the statistics it has so far.
+/// Prints where the finished tiles of a failed render are kept, and writes its statistics so far.
 pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
     if error.is_input() {
         return;
@@ -41,9 +41,9 @@ pub(super) struct Finished {
     /// File names and options that determine the scene, with the number of a frame.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
-    /// Settings that the quality has found for the scene; `None` without a pilot.
+    /// Settings that a pilot render has chosen; `None` without a pilot render.
     pub(super) fit: Option<Fit>,
-    /// Number of the frame; `None` for a picture at rest.
+    /// Number of the frame; `None` for a picture without animation.
     pub(super) frame: Option<u32>,
     pub(super) circumstances: Circumstances,
 }
@@ -99,7 +99,8 @@ pub(super) fn chosen(
     (settings.photons, settings.integrator)
 }
 
-/// Memory of the card that has most, bytes: a scene may need all of it, and smaller cards are then left out.
+/// Memory of the card with the most memory, bytes. A scene may need all of it: smaller cards are then left
+/// out.
 pub(super) fn dram_bytes(settings: &RenderSettings) -> u64 {
     settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX)
 }

@@ -93,7 +93,7 @@ struct Display {
     /// Estimate of the remaining time, which the bar reads each time it is drawn.
     remaining: Arc<Mutex<Remaining>>,
     on_terminal: bool,
-    /// Tenths of the points that the last printed line states, without a terminal.
+    /// Tenths of the points that were measured at the last printed line; used without a terminal.
     told: usize,
 }
 
@@ -162,7 +162,7 @@ impl Display {
         }
     }
 
-    /// Starts the progress bar of a study, of whose points `done` are stored from an earlier run.
+    /// Starts the progress bar of a study. An earlier run has stored `done` of its `total` points.
     fn begin(&mut self, study: &str, done: usize, total: usize) {
         self.bar.finish_and_clear();
         study.clone_into(&mut self.study);

@@ -1,4 +1,5 @@
-//! Points of `photoncard study sweep`: each has the command line's arguments with some values replaced.
+//! Points (measurements) of `photoncard study sweep`. A point has the arguments of the command line, but
+//! other values of the varied options.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -47,8 +48,8 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
-/// Returns the point with these values, and adds notices about it to `notices`. If no size is stated, the
-/// picture has the camera's aspect ratio.
+/// Returns the point of the sweep at which the options have these values, and adds notices about it to
+/// `notices`. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],
@@ -127,7 +128,7 @@ fn reason(error: &clap::Error) -> String {
     text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The error that `--vary` cannot take these values together, for `reason`.
+/// Error that `--vary` cannot take these values together; `reason` says why.
 fn refused(values: &[Value], reason: &str) -> Failure {
     let values: Vec<_> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
     let text = format!("--vary {} is not possible: {reason}", values.join(" with "));
@@ -135,7 +136,7 @@ fn refused(values: &[Value], reason: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Failure of a point or of the axes.
+/// Failure to create a point or the axes of a sweep.
 struct PointError(Failure);
 
 impl From<AxisError> for PointError {

@@ -1,8 +1,8 @@
-//! Tiles that pages are sent: those of the newest [wish](super::wish) that has a tile, numbered in the order
-//! of completion.
+//! Tiles to send to pages, numbered in the order of completion. All are of one picture: the newest [requested
+//! picture](super::wish) that has a tile.
 //!
-//! A page remembers only the number of its next tile; outdated tiles are dropped before the page is sent
-//! them. A slow page therefore receives fewer and newer tiles, and needs no buffer.
+//! The only state of a page is the number of its next tile. Outdated tiles are dropped, even if a page has
+//! not been sent them. A slow page therefore receives fewer and newer tiles, and needs no buffer.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -29,15 +29,16 @@ impl Shown {
     }
 }
 
-/// Picture that a tile belongs to: wish, pass, resolution and number of samples.
+/// Rendered picture that a tile belongs to: number of the request, kind of pass, resolution, number of
+/// samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin {
-    /// Number of the wish.
+    /// Number of the requested picture.
     pub(super) version: u32,
     /// True for a tile of [`Pass::Coarse`](super::refinement::Pass::Coarse), whose settings are cheaper than
     /// the final picture's.
     pub(super) is_coarse: bool,
-    /// Side of the square of the full picture's pixels that one rendered pixel covers.
+    /// Side of the square that one rendered pixel covers, in pixels of the full picture.
     pub(super) step: u32,
     /// Samples per pixel.
     pub(super) samples: u32,
@@ -60,7 +61,7 @@ impl TileWork {
         Self { gathers, records: counters.records, dram_lines }
     }
 
-    /// Sum of the work on earlier samples and of that on further ones.
+    /// Sum of the work on earlier samples (`self`) and on further samples (`more`).
     fn and(self, more: Self) -> Self {
         Self {
             gathers: self.gathers.saturating_add(more.gathers),
@@ -69,7 +70,8 @@ impl TileWork {
         }
     }
 
-    /// Gathers, records and DRAM lines in a tile's header; [`UNKNOWN`] for a count that is not known.
+    /// Returns the counts for a tile's header: gathers, irradiance records, DRAM lines. An unknown count is
+    /// [`UNKNOWN`].
     fn words(self) -> [u32; 3] {
         [Some(self.gathers), Some(self.records), self.dram_lines]
             .map(|count| count.map_or(UNKNOWN, |count| count.min(u64::from(UNKNOWN - 1)) as u32))
@@ -107,7 +109,7 @@ impl Patch {
         Self { tile: self.tile.clone(), denoised, ..*self }
     }
 
-    /// Returns whether this tile has more samples than an earlier one of the same area, wish and resolution.
+    /// Returns whether this tile has the request, pass and resolution of `earlier`, but more samples.
     fn goes_on(&self, earlier: &Self) -> bool {
         earlier.origin.samples < self.origin.samples
             && Origin { samples: self.origin.samples, ..earlier.origin } == self.origin
@@ -123,7 +125,8 @@ impl Patch {
         HEADER + PIXEL * self.tile.tile().pixels() as usize
     }
 
-    /// Message with the tile, little-endian: header, and three `f32` a pixel of what the page shows.
+    /// Returns the tile as a message, little-endian: a header, then three `f32` per pixel of the quantity
+    /// `shown`.
     pub(super) fn message(&self, shown: Shown) -> Vec<u8> {
         let Origin { version, is_coarse: _, step, samples } = self.origin;
         let [gathers, records, lines] = self.work.words();
@@ -140,7 +143,8 @@ impl Patch {
         bytes
     }
 
-    /// Pixel of the tile that covers `(x, y)` of the full picture; `None` if the tile does not.
+    /// Pixel of the tile that covers pixel `(x, y)` of the full picture; `None` if the tile does not cover
+    /// it.
     fn pixel(&self, [x, y]: [u32; 2]) -> Option<FilmPixel> {
         let [x, y] = [x, y].map(|at| at / self.origin.step);
         let tile = self.tile.tile();
@@ -151,7 +155,7 @@ impl Patch {
     }
 }
 
-/// Three channel values of a pixel for a page. A layer of one channel is repeated.
+/// Returns three values of a pixel for a page. The value of a layer with one channel is repeated.
 fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     let Shown::Layer(layer) = shown else { return pixel.pixel.radiance };
     match layer.channels() {
@@ -164,7 +168,7 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
 /// Column and row of a tile's corner, and its number of pixels.
 type Area = (u32, u32, u64);
 
-/// Tiles of the newest wish that has any.
+/// Tiles of the newest requested picture that has any.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     patches: VecDeque<(u64, Arc<Patch>)>,
@@ -175,8 +179,8 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Adds a tile. If the same area has an earlier tile with fewer samples of the same picture, the work of
-    /// the earlier tile is added to that of the new one. Drops tiles of older wishes.
+    /// Adds a tile, and drops the tiles of older requests. If the same area has an earlier tile with fewer
+    /// samples of the same picture, the earlier tile's work is added to that of the new one.
     pub(super) fn put(&mut self, mut patch: Patch) {
         let version = patch.origin.version;
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
@@ -205,12 +209,11 @@ impl Canvas {
         denoised.into_iter().for_each(|patch| self.push(patch));
     }
 
-    /// Drops all tiles.
     pub(super) fn clear(&mut self) {
         self.retain(|_| false);
     }
 
-    /// Drops the tiles of other wishes.
+    /// Drops the tiles of all requests but number `version`.
     pub(super) fn keep_version(&mut self, version: u32) {
         self.retain(|patch| patch.origin.version == version);
     }
@@ -239,7 +242,8 @@ impl Canvas {
         self.patches.get(index).cloned()
     }
 
-    /// Depth of a wish's newest tile at pixel `at`, metres; `None` where no surface is seen.
+    /// Depth at pixel `at` in the newest tile of request `version` there, metres; `None` where no surface is
+    /// seen.
     pub(super) fn depth(&self, version: u32, at: [u32; 2]) -> Option<f32> {
         let mut of_wish = self.patches.iter().rev().filter(|(_, patch)| patch.origin.version == version);
         let seen = of_wish.find_map(|(_, patch)| patch.pixel(at))?;

@@ -57,8 +57,8 @@ impl CardBoard {
         self.cards.iter_mut().enumerate().find(|(_, card)| card.name == name)
     }
 
-    /// Counts a tile that a card rendered. Returns the card's index, and whether the card becomes ready by
-    /// it.
+    /// Counts a tile that a card rendered. Returns the card's index, and whether this tile makes the card
+    /// ready.
     pub(super) fn rendered(&mut self, name: &str) -> (u32, bool) {
         let Some((number, card)) = self.of_name(name) else { return (0, false) };
         card.tiles += 1;
@@ -68,7 +68,6 @@ impl CardBoard {
         (number as u32, is_new)
     }
 
-    /// Records that a card is lost.
     pub(super) fn lose(&mut self, name: &str, error: String, now: Duration) {
         if let Some((_, card)) = self.of_name(name) {
             (card.standing, card.error) = (Standing::Lost, Some(error));
@@ -76,7 +75,8 @@ impl CardBoard {
         }
     }
 
-    /// Returns a lost remote card that is due for an attempt, with its index, and doubles the pause after it.
+    /// Returns a lost remote card, with its index, for which an attempt to reconnect is due. Doubles the
+    /// card's pause.
     pub(super) fn next_to_try(&mut self, now: Duration) -> Option<(usize, CardAddress)> {
         let is_due =
             |card: &Card| card.standing == Standing::Lost && card.address.is_some() && card.try_at <= now;

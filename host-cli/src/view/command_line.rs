@@ -1,4 +1,4 @@
-//! Command line that renders the settled (final) picture of a wish, with every option that the pixels or the
+//! Command line that renders the final picture that pages request, with every option that the pixels or the
 //! work of the picture depend on.
 
 use photoncard_driver::choice::Choice;
@@ -11,7 +11,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::shell;
 
-/// Words of the command that renders the settled picture of a wish.
+/// Words of the command that renders the final picture of `wish`.
 pub(super) fn words(scene: &SceneOptions, quality: Quality, finish: Finish, wish: &Wish) -> Vec<String> {
     let mut words = Words(vec!["photoncard".into(), "render".into(), path(&scene.path.to_string_lossy())]);
     words.add("quality", quality.name());

@@ -24,7 +24,8 @@ impl SceneFacts {
         Self { name, low, high }
     }
 
-    /// First message to a page. `scene` has the materials and lights before any change by a page.
+    /// First message to a page. `scene` has the materials and lights before any change by a page. `out` is
+    /// the folder of saved pictures, and `steers` whether the page controls the view.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {
@@ -49,8 +50,8 @@ impl SceneFacts {
         })
     }
 
-    /// Camera with the point that pages turn it around: on its axis, at the depth of the bounding box's
-    /// centre.
+    /// Camera as JSON, with the point around which pages turn it: on its axis, at the depth of the centre of
+    /// the scene's bounding box.
     pub(super) fn camera(&self, camera: &Camera, scene: &Scene) -> Value {
         let middle = 0.5 * (self.low + self.high);
         let size = (self.high - self.low).length().max(1e-3);
@@ -117,8 +118,7 @@ fn properties(material: &Material) -> Map<String, Value> {
     properties
 }
 
-/// Changes of materials and lights that pages have made, in a wish (the settings, camera and changes that
-/// pages request).
+/// Changes of materials and lights that pages have made, as part of a message to pages.
 pub(super) fn changes(wish: &Wish) -> Value {
     let change = |(name, value): &(String, Vec<f64>)| match value[..] {
         [value] => json!({"name": name, "value": value}),
@@ -127,7 +127,7 @@ pub(super) fn changes(wish: &Wish) -> Value {
     wish.edits().iter().map(change).collect()
 }
 
-/// Settings of the settled picture, which pages show and may change in part.
+/// Settings of the final picture, as part of a message to pages. Pages can change some of them.
 pub(super) fn settings(settings: &RenderSettings) -> Value {
     let RenderSettings { photons, integrator, schedule, picture, .. } = settings;
     json!({
@@ -147,8 +147,8 @@ pub(super) fn settings(settings: &RenderSettings) -> Value {
 /// Cost of the newest card image and of the newest pass, for pages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
-    /// Seconds of tracing photons; `pack`, `load` and `render` are those of building the card image, of
-    /// loading the cards and of rendering.
+    /// Time of tracing photons, seconds; `pack`, `load` and `render` are the times of building the card
+    /// image, of loading the cards and of rendering.
     photons: f64,
     pack: f64,
     load: f64,

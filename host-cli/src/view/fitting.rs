@@ -1,5 +1,5 @@
-//! Pilot renders (small test renders by which a quality chooses settings). They run on a thread of their own,
-//! so that the painter can meanwhile render a newer [wish](super::wish).
+//! Pilot renders: small test renders by which a quality chooses settings. They run on a thread of their own:
+//! a newer [request](super::wish) can be rendered meanwhile.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,7 +49,7 @@ impl Fitting {
         Ok(Self { thread: std::thread::Builder::new().name("pilot".into()).spawn(work)?, stop })
     }
 
-    /// Waits for the result. If `must_stop` becomes true first, returns the pilot renders, which continue.
+    /// Waits for the result. If `must_stop` returns true before, returns `self`; the pilot renders continue.
     pub(super) fn wait(self, must_stop: &dyn Fn() -> bool) -> Result<Found, Self> {
         while !self.thread.is_finished() {
             if must_stop() {

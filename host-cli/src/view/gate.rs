@@ -1,8 +1,8 @@
 //! Access control: checks of a request's address, its origin and its token.
 //!
-//! A page of another site must not reach the view. Browsers state in `Host` the name that they resolved, so
-//! that foreign names that resolve to this machine are refused (DNS rebinding). They state in `Origin` the
-//! site whose script opens a connection. Only those who have seen the printed address know the token.
+//! A page of another site must not reach the view. Browsers state in `Host` the name that they resolved. All
+//! names but this machine's are refused, against DNS rebinding. Browsers state in `Origin` the site whose
+//! script opens a connection. Only people who have seen the printed address know the token.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -16,7 +16,7 @@ const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
-/// Resource that a request may have.
+/// Resource that an accepted request receives.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
     /// File of the page.
@@ -49,7 +49,7 @@ impl Gate {
         format!("http://{here}{PAGE}?token={token}")
     }
 
-    /// Checks a request and returns what it is granted.
+    /// Checks a request, and returns the resource that it asks for.
     ///
     /// # Errors
     /// The refusal of a request for another host, from another site, without the token, or for a path that
@@ -85,8 +85,8 @@ impl Gate {
     }
 
     /// Returns whether a `Host` header names this server: by the address at which it listens, or as
-    /// `localhost` if that includes this machine. A server that listens at all addresses accepts any IP
-    /// address.
+    /// `localhost` if it listens at a loopback address or at all addresses. If it listens at all addresses,
+    /// any IP address is valid.
     fn is_own(&self, host: &str) -> bool {
         let Self { address, .. } = self;
         let name = match host.strip_suffix(&format!(":{}", address.port())) {

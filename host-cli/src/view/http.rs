@@ -8,7 +8,6 @@ use super::page_files::PageFile;
 
 /// Maximum size of a request's head, bytes.
 const MAX_HEAD: usize = 8 << 10;
-/// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
 /// Time limit for reading a request's head, and for each write of a response.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -39,7 +38,6 @@ impl Refusal {
         Self::new(403, "Forbidden", text)
     }
 
-    /// Sends the response.
     pub(super) fn send(&self, stream: &mut TcpStream) -> std::io::Result<()> {
         let Self { status, reason, text } = self;
         respond(stream, &format!("{status} {reason}"), "text/plain; charset=utf-8", "", text.as_bytes())
@@ -123,7 +121,7 @@ impl Head {
     }
 }
 
-/// Sends a file of the page. `host` is the request's `Host`, whose WebSocket the page may open.
+/// Sends a file of the page. `host` is the request's `Host`; the page may open a WebSocket to it.
 pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
     // Not all browsers let `'self'` stand for the server's WebSocket.
     let policy = format!(

@@ -1,5 +1,5 @@
-//! State of a view under one lock, which all its threads share, with a condition variable that is notified of
-//! each change.
+//! State of a view, which all its threads share under one lock. A condition variable is notified of each
+//! change.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::console::printable_json;
 use crate::render::files::{Form, write_picture};
 
-/// Settled picture, which pages can save: the final picture of a wish, equal to that of `photoncard render`.
+/// Final picture of a request, equal to that of `photoncard render`. Pages can save it.
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
@@ -36,7 +36,7 @@ pub(super) struct Hub {
     /// Notified of each change.
     changed: Condvar,
     must_stop: AtomicBool,
-    /// Set by signals, and by the painter when it ends.
+    /// True once the view is over: set by signals, and by the rendering thread when it ends.
     is_over: Arc<AtomicBool>,
     is_card_back: AtomicBool,
     settled: Mutex<Option<Arc<Settled>>>,
@@ -78,12 +78,10 @@ impl Hub {
         self.must_stop.load(Ordering::Relaxed) || self.is_over()
     }
 
-    /// Returns whether the view is over.
     pub(super) fn is_over(&self) -> bool {
         self.is_over.load(Ordering::Relaxed)
     }
 
-    /// Ends the view.
     pub(super) fn end(&self) {
         self.is_over.store(true, Ordering::Relaxed);
         self.changed.notify_all();
@@ -108,7 +106,7 @@ impl Hub {
         None
     }
 
-    /// Keeps a settled picture, so that it can be saved.
+    /// Keeps a final picture, so that pages can save it.
     pub(super) fn keep(&self, settled: Settled) {
         *self.settled.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(settled));
     }
@@ -129,7 +127,7 @@ impl Hub {
         }
     }
 
-    /// Saves the settled picture of the newest wish.
+    /// Saves the final picture of the newest request.
     fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
         let version = self.lock().version();
         let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -143,7 +141,7 @@ impl Hub {
         folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
     }
 
-    /// Waits until no picture is being written. Once the view is over, pages can save no other.
+    /// Waits until no picture is being written. Once the view is over, no further picture can be saved.
     pub(super) fn finish_saving(&self) {
         drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
     }
@@ -181,7 +179,7 @@ impl Hub {
     }
 }
 
-/// Writes a settled picture as `photoncard render` would.
+/// Writes a final picture as `photoncard render` would.
 fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
     let layers = settled.wish.settings.picture.layers.clone();

@@ -113,7 +113,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     Err(Failure::Stopped("stopped; the view is over"))
 }
 
-/// Checks the settings, which for a view have neither a crop window nor a trace.
+/// Checks the settings of a view. A crop window or a trace is an error.
 fn check(settings: &RenderSettings) -> Result<(), Failure> {
     let [option, reason] = if settings.picture.crop.is_some() {
         ["--crop", "a view shows the whole picture"]
@@ -215,8 +215,8 @@ fn open_in_browser(url: &str) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Tries to reconnect lost cards until the view is over, each card after pauses that double, and reports to
-/// the hub each card that answers.
+/// Tries to reconnect lost cards until the view is over, and reports to the hub each card that answers. The
+/// pause between the attempts for a card doubles each time.
 fn look_for_cards(hub: &Hub) {
     while !hub.is_over() {
         std::thread::sleep(LOOK);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::canvas::{Canvas, Patch, Shown};
 
-/// Maximum total size of unacknowledged tiles, bytes. If a page has acknowledged all tiles, a larger tile is
-/// sent as well.
+/// Maximum total size of the tiles that a page was sent and has not acknowledged, bytes. If it has
+/// acknowledged all, one larger tile is sent as well.
 const MAX_ON_THE_WAY: u64 = 4 << 20;
 /// Maximum number of answers that wait for a page. Older ones are dropped.
 const MAX_REPLIES: usize = 64;
@@ -16,11 +16,12 @@ const MAX_REPLIES: usize = 64;
 pub(super) enum Outgoing {
     /// Answer to a message of the page, or an error.
     Reply(String),
-    /// Newest state of the view. True if the page has all tiles, so that the state may say `settled`.
+    /// Newest state of the view. The flag is true if the page has all tiles: only then the state may be
+    /// `settled`.
     State(bool),
     /// Newest states of the cards.
     Cards,
-    /// Tile, and what the page shows of it.
+    /// Tile, and the quantity in it that the page shows.
     Tile(Arc<Patch>, Shown),
 }
 
@@ -36,8 +37,8 @@ pub(super) struct Revisions {
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
-    /// Number of the wish in the last state that was sent. A wish's state, which has the picture's size,
-    /// precedes its tiles.
+    /// Number of the request in the last state message that was sent. The state message of a request, which
+    /// has the picture's size, precedes its tiles.
     told: u32,
     shown: Shown,
     /// Number of the next tile to send, in the [`Canvas`].
@@ -61,7 +62,6 @@ impl Page {
         }
     }
 
-    /// Queues an answer.
     pub(super) fn reply(&mut self, text: String) {
         if self.replies.len() == MAX_REPLIES {
             self.replies.pop_front();
@@ -69,7 +69,7 @@ impl Page {
         self.replies.push_back(text);
     }
 
-    /// Shows radiance or a layer: all tiles are sent again.
+    /// Sets what the page shows: radiance or a layer. All tiles are sent to it again.
     pub(super) fn show(&mut self, shown: Shown) {
         (self.shown, self.next) = (shown, 0);
     }
@@ -86,7 +86,7 @@ impl Page {
     }
 
     /// Selects the next message; `None` if there is none, or if tiles have to be acknowledged first. The
-    /// state of a wish precedes its first tile, and the settled state follows the last tile.
+    /// state message of a request precedes its first tile; the `settled` state follows the last tile.
     pub(super) fn take(
         &mut self,
         canvas: &Canvas,

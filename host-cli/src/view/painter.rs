@@ -1,4 +1,4 @@
-//! Thread that renders one [wish](super::wish) of a view after another, on the same cards.
+//! Thread that renders the [pictures that pages request](super::wish), one after another, on the same cards.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,8 +31,7 @@ pub(super) struct Painter<'a> {
     renderer: Renderer,
     threads: Option<usize>,
     scene: Arc<Scene>,
-    /// Pilot renders that continue in the background, because a newer request of a page (a wish) came before
-    /// they ended.
+    /// Pilot renders that continue in the background, because a page made a newer request before they ended.
     fitting: Option<Fitting>,
     /// Assignments (`--set`, and those of pages) that were applied to `scene`; `None` before the first
     /// picture, and after an assignment has failed.
@@ -80,7 +79,7 @@ impl<'a> Painter<'a> {
         self.fitting.take().into_iter().for_each(Fitting::stop);
     }
 
-    /// Gives the scene the materials and lights of a task's wish.
+    /// Gives the scene the materials and lights that a task's request states.
     fn assign(&mut self, task: &Task) -> Result<(), RenderError> {
         let assignments = task.wish.assignments();
         if self.assigned.as_ref() == Some(&assignments) {
@@ -97,8 +96,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Starts pilot renders unless some are in progress, and waits for their result. A newer wish interrupts
-    /// the wait; the pilot renders continue for the camera with which they were started.
+    /// Starts pilot renders unless some are in progress, and waits for their result. A newer request
+    /// interrupts the wait; the pilot renders continue for the camera with which they were started.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let by = (self.quality, self.finish);
         let begin = || Fitting::start(self.scene.clone(), by, task.settings.clone(), self.threads);
@@ -138,8 +137,7 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Denoises the settled picture (the final one of a wish), if the view denoises. Pages are sent the
-    /// result, or the error.
+    /// Denoises the final picture of a request, if the view denoises. Pages are sent the result or the error.
     fn denoise(&self, task: &Task, film: &Film) -> Result<Option<Vec<[f32; 3]>>, RenderError> {
         let Some(denoiser) = self.denoiser else { return Ok(None) };
         let denoised = denoiser.radiance(film, self.threads, &|| self.hub.must_stop());
@@ -156,7 +154,7 @@ impl<'a> Painter<'a> {
         Ok(denoised.ok())
     }
 
-    /// Renders a picture by passes: after each, a pixel has twice as many samples.
+    /// Renders a picture by passes, each of which doubles the number of samples up to the requested one.
     fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
@@ -209,13 +207,13 @@ impl Drop for EndOnDrop<'_> {
     }
 }
 
-/// Observer of one pass, which puts its tiles on the view's canvas.
+/// Observer that puts the tiles of one pass on the view's canvas.
 struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
     is_preparing: AtomicBool,
-    /// By a tile's number: card that rendered it, and lines that the card read from DRAM. An entry is removed
-    /// when the tile's pixels arrive.
+    /// Card that rendered a tile, and number of lines that it read from DRAM for the tile, by the tile's
+    /// number. An entry is removed when the tile's pixels arrive.
     cards: Mutex<HashMap<u32, (String, Option<u64>)>>,
 }
 

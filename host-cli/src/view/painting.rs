@@ -1,5 +1,5 @@
-//! Interface between a view's state and the painter: the next pass with its settings, finished tiles, and
-//! ends of passes. A pass renders a [wish](super::wish).
+//! Interface between a view's state and the rendering thread (the painter): the next pass with its settings,
+//! finished tiles, and ends of passes. A pass renders a [requested picture](super::wish).
 
 use std::time::Duration;
 
@@ -21,7 +21,8 @@ const RAYS: [u32; 2] = [6, 16];
 const IRRADIANCE_ERROR: f32 = 1.0;
 
 impl View {
-    /// Returns the next pass to render, or the time until which to wait for one.
+    /// Returns the next pass to render. The error is the time until which to wait; `None` to wait for a
+    /// change.
     pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
         let work = match self.refinement.next(now) {
             Next::Work(work) => work,
@@ -68,7 +69,7 @@ impl View {
         self.canvas.revoke(origin, id);
     }
 
-    /// Records the end of the running pass. `statistics` are those of a complete picture.
+    /// Records the end of the running pass. `statistics` is `None` unless the pass has completed a picture.
     pub(super) fn finish(
         &mut self,
         task: &Task,
@@ -89,8 +90,9 @@ impl View {
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
     }
 
-    /// Records that a task's wish cannot be rendered. The newest wish is replaced by one with the settings of
-    /// the last settled picture, unless it has these settings already or they cannot be rendered either.
+    /// Records that a task's request cannot be rendered. If it is the newest request, its settings are
+    /// replaced by those of the last complete final picture. If this is not possible, `reason` is kept for
+    /// pages.
     pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
         self.tell_error(reason);
         self.finish(task, Outcome::Refused, None, now);
@@ -111,7 +113,7 @@ impl View {
         self.revisions.state += 1;
     }
 
-    /// If `origin`, a complete pass, is of the newest wish, drops all other tiles.
+    /// Drops all tiles but those of the complete pass `origin`, if it is a pass of the newest request.
     fn keep(&mut self, origin: Origin) {
         if origin.version == self.refinement.version() {
             self.done = Some(origin);
@@ -133,16 +135,15 @@ impl View {
         self.finish(task, Outcome::Fitted { has_other_photons }, None, now);
     }
 
-    /// Records that a card is lost.
     pub(super) fn lose_card(&mut self, name: &str, error: String, now: Duration) {
         self.cards.lose(name, error, now);
         self.revisions.cards += 1;
     }
 }
 
-/// Settings of a coarse picture with one pixel for each square of `step` x `step`. Photon maps stay those of
-/// the settled picture: no photon is traced again. Directions of gather rays follow the reflection alone,
-/// which is faster for few rays than gathering photons for direction tables.
+/// Settings of a coarse picture with one pixel for each square of `step` x `step`. Photon maps are those of
+/// the final picture: no photon is traced again. Directions of gather rays are sampled by the reflection
+/// alone: for few rays this is faster than gathering photons for direction tables.
 fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     settings.clone().with(|settings| {
         let picture = &mut settings.picture;
@@ -165,7 +166,7 @@ fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     })
 }
 
-/// Settings of the settled picture. Tiles near the pixel `focus` are rendered first.
+/// Settings of the final picture. Tiles near the pixel `focus` are rendered first; `None` for the middle.
 fn full(settings: &RenderSettings, focus: Option<[u32; 2]>) -> RenderSettings {
     settings.clone().with(|settings| {
         let middle = [settings.picture.width / 2, settings.picture.height / 2];

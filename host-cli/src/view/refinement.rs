@@ -1,9 +1,9 @@
-//! Order of a view's passes, from the coarsest picture to the settled one, which is that of
-//! `photoncard render`: a state machine without threads, clock or pixels.
+//! Order of a view's passes, as a state machine without threads, clock or pixels. It begins with the coarsest
+//! picture, and ends with the final picture, which equals that of `photoncard render`.
 //!
-//! A newer [wish](super::wish) stops the running pass of an older one, with two exceptions. If the first pass
-//! of a wish was stopped, the next first pass runs to its end: pages are shown pictures however fast wishes
-//! follow each other. Photons that the newest wish can use are traced to their end.
+//! A newer [request](super::wish) stops the running pass of an older one, with two exceptions. If the first
+//! pass of a request was stopped, the next first pass runs to its end: pages show pictures however fast
+//! requests follow each other. Photons that the newest request can use are traced to their end.
 
 use std::time::Duration;
 
@@ -15,30 +15,30 @@ const FIRST_PAUSE: Duration = Duration::from_millis(500);
 /// Maximum pause after a failure.
 const MAX_PAUSE: Duration = Duration::from_secs(8);
 
-/// Side of the squares of pixels for each of which the first pass renders one pixel.
+/// Side of the squares in the first pass, pixels: one pixel is rendered for each square.
 pub(super) const COARSEST: u32 = 8;
-/// If the pass with every pixel is expected to take at most this time, it directly follows the first pass:
-/// pictures in between would hardly be seen.
+/// Maximum expected time of the coarse pass with every pixel, for which it directly follows the first pass.
+/// Pictures in between would hardly be seen.
 const SEEN: Duration = Duration::from_millis(800);
-/// If the pass with every pixel is expected to take at most this time, the pass with every second column and
+/// Maximum expected time of the coarse pass with every pixel, for which the pass with every second column and
 /// row, a quarter of the work, is left out.
 const AWAITED: Duration = Duration::from_secs(4);
-/// Side of the squares in the pass before that with every second column and row.
+/// Maximum side of the squares for which the limit is `AWAITED`, pixels; for greater sides it is `SEEN`.
 const FINE: u32 = 4;
 
-/// Pass on the way to the settled picture.
+/// Pass on the way to the final picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// Picture by cheap settings, with one pixel for each square of this side.
+    /// Picture with cheaper settings: one pixel is rendered for each square with this side, pixels.
     Coarse(u32),
     /// Pilot renders, by which a quality chooses the settings.
     Fit,
-    /// Picture of `photoncard render`, at all its samples.
+    /// Final picture with all its samples, equal to that of `photoncard render`.
     Full,
 }
 
 impl Pass {
-    /// First pass of each wish.
+    /// First pass of each request.
     pub(super) const FIRST: Self = Self::Coarse(COARSEST);
 }
 
@@ -62,9 +62,9 @@ fn next_step(step: u32, time: Duration) -> u32 {
 /// Pass of the picture that one [`Wish`](super::wish::Wish) requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Work {
-    /// Number of the wish.
+    /// Number of the requested picture.
     pub(super) version: u32,
-    /// Number of the wish's edition: wishes with the same scene and photons have the same number.
+    /// Number of the edition: requests with the same scene and photons have the same edition.
     pub(super) edition: u32,
     pub(super) pass: Pass,
 }
@@ -79,15 +79,15 @@ pub(super) enum Outcome {
         /// True if pilot renders have changed the number of photons.
         has_other_photons: bool,
     },
-    /// A newer wish has stopped the pass.
+    /// A newer request has stopped the pass.
     Stopped,
     /// No card is left.
     NoCard,
-    /// The wish cannot be rendered.
+    /// The requested picture cannot be rendered.
     Refused,
 }
 
-/// Next action of the painter.
+/// Next action of the rendering thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Next {
     Work(Work),
@@ -95,12 +95,12 @@ pub(super) enum Next {
     Wait(Option<Duration>),
 }
 
-/// Progress of the newest wish.
+/// Progress of the newest requested picture.
 #[derive(Debug)]
 pub(super) struct Refinement {
     version: u32,
     edition: u32,
-    /// Next pass of the newest wish; `None` once its picture is settled.
+    /// Next pass of the newest request; `None` once its final picture is complete.
     pass: Option<Pass>,
     is_fitted: bool,
     is_refused: bool,
@@ -117,7 +117,7 @@ pub(super) struct Refinement {
 }
 
 impl Refinement {
-    /// Creates the state for the first wish. `is_fitted` is true if no setting is left to pilot renders.
+    /// Creates the state for the first request. `is_fitted` is true if no setting is left to pilot renders.
     pub(super) fn new(is_fitted: bool) -> Self {
         Self {
             version: 1,
@@ -135,23 +135,24 @@ impl Refinement {
         }
     }
 
-    /// Number of the newest wish, from 1.
+    /// Number of the newest request, from 1.
     pub(super) fn version(&self) -> u32 {
         self.version
     }
 
-    /// Returns whether the newest wish has its last picture, that of `photoncard render`.
+    /// Returns whether the final picture of the newest request is complete.
     pub(super) fn is_settled(&self) -> bool {
         self.pass.is_none()
     }
 
-    /// Returns whether the settings of pilot renders are known.
+    /// Returns whether pilot renders have chosen settings, or had none to choose.
     #[cfg(test)]
     pub(super) fn is_fitted(&self) -> bool {
         self.is_fitted
     }
 
-    /// Starts a new wish. `is_edit` is true if its scene or photons differ from those of the wish before.
+    /// Starts a new request. `is_edit` is true if its scene or photons differ from those of the request
+    /// before.
     pub(super) fn wish(&mut self, is_edit: bool) {
         self.version += 1;
         self.edition += u32::from(is_edit);
@@ -183,13 +184,13 @@ impl Refinement {
         work.pass != Pass::FIRST || self.may_stop_first
     }
 
-    /// Number of the running pass's wish, unless the pass must stop: the newest wish, or an older one whose
-    /// first pass or photons must be completed.
+    /// Number of the request whose pass is running; `None` if the pass must stop. The request is the newest,
+    /// or an older one whose first pass or photons must be completed.
     pub(super) fn spares(&self) -> Option<u32> {
         self.running.filter(|_| !self.must_stop()).map(|work| work.version)
     }
 
-    /// Next action of the painter at time `now`.
+    /// Next action of the rendering thread at time `now`.
     pub(super) fn next(&mut self, now: Duration) -> Next {
         let Some(pass) = self.pass.filter(|_| self.running.is_none() && !self.is_refused) else {
             return Next::Wait(None);
@@ -247,8 +248,8 @@ mod tests {
         }
     }
 
-    /// Runs all passes until the picture is settled, and returns them. A coarse pass of side 8 takes `time`,
-    /// others in proportion to their pixels.
+    /// Runs all passes until the final picture is complete, and returns them. A coarse pass of side 8 takes
+    /// `time`, others in proportion to their pixels.
     fn settle(refinement: &mut Refinement, time: Duration) -> Vec<Pass> {
         let mut passes = Vec::new();
         let mut now = NOW;

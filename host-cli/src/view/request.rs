@@ -163,7 +163,7 @@ impl Fields<'_> {
         number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
     }
 
-    /// Returns the value of a field, which is a number or a list of three numbers, each finite as `f32`.
+    /// Returns the numbers in a field: one number, or a list of three. Each must be finite as `f32`.
     fn values(&self, name: &str) -> Result<Vec<f64>, String> {
         let number = |value: &Value| value.as_f64().filter(|number| (*number as f32).is_finite());
         let values = match self.field(name)? {
@@ -173,7 +173,7 @@ impl Fields<'_> {
         values.ok_or_else(|| format!("{name:?} is a number, or a list of three"))
     }
 
-    /// Tone mapping. A missing or null field has its default.
+    /// Parses the tone mapping of a picture to save. A missing or null field has its default.
     fn tone(&self) -> Result<ToneMapping, String> {
         let is_stated = |name: &str| self.0.get(name).is_some_and(|value| !value.is_null());
         let stops = || self.number("exposure", -MAX_STOPS, MAX_STOPS);

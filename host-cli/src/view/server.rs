@@ -69,7 +69,7 @@ impl Strangers {
     }
 }
 
-/// Entry of a connection among the strangers, removed when this is dropped.
+/// Guard of a connection's entry among the strangers. The entry is removed when the guard is dropped.
 struct Stranger {
     number: u64,
     of: Strangers,
@@ -82,8 +82,7 @@ impl Drop for Stranger {
     }
 }
 
-/// One accepted connection in the count of these connections, from which it is subtracted when this guard is
-/// dropped.
+/// Guard that counts one accepted connection. The count decreases when the guard is dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {

@@ -1,5 +1,5 @@
-//! State of a view: [wishes](super::wish), their tiles, and the connected pages. Threads, clock, input and
-//! output are in [`super::hub`].
+//! State of a view: the [pictures that pages request](super::wish), their tiles, and the connected pages.
+//! Threads, clock, input and output are in [`super::hub`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -38,20 +38,20 @@ pub(super) struct Start {
     pub(super) out: Option<String>,
 }
 
-/// Pass to render, with its wish and settings.
+/// Pass to render, with the request that it belongs to and its settings.
 pub(super) struct Task {
     pub(super) work: Work,
     pub(super) wish: Wish,
-    /// Settings of the pass. For [`super::refinement::Pass::Fit`] they are those of the wish.
+    /// Settings of the pass. For [`super::refinement::Pass::Fit`] they are those of the request.
     pub(super) settings: RenderSettings,
     pub(super) origin: Origin,
 }
 
-/// Work for the caller after a message from a page.
+/// Action for the caller after a message from a page.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,
-    /// Save the settled picture.
+    /// Save the final picture.
     Save(Saving),
     /// Close the connection.
     Close,
@@ -61,20 +61,21 @@ pub(super) enum Effect {
 pub(super) struct View {
     pub(super) start: Start,
     pub(super) wish: Wish,
-    /// Sketch with the file's cameras, and with the materials and lights of the newest wish.
+    /// Sketch (reduced scene) with the file's cameras, and with the materials and lights of the newest
+    /// request.
     scene: Scene,
-    /// Sketch with the materials and lights of the first wish, to which `reset` returns.
+    /// Sketch with the materials and lights of the first request, which `reset` restores.
     first: Scene,
     pub(super) refinement: Refinement,
-    /// Wish of the last picture that settled.
+    /// Request of the last complete final picture.
     pub(super) settled: Option<Wish>,
-    /// Reason why the newest wish cannot be rendered.
+    /// Reason why the newest request cannot be rendered; `None` if it can.
     pub(super) refused: Option<String>,
     pub(super) canvas: Canvas,
-    /// Last complete pass of the newest wish.
+    /// Last complete pass of the newest request.
     pub(super) done: Option<Origin>,
     pub(super) cost: Cost,
-    /// Number of the first wish that has the present size of the picture.
+    /// Number of the first request that has the present size of the picture.
     of_size: u32,
     /// Pixel near which tiles are rendered first.
     pub(super) cursor: Option<[u32; 2]>,
@@ -91,7 +92,7 @@ impl View {
     /// Creates a view without pages.
     ///
     /// # Errors
-    /// If the first wish cannot be rendered.
+    /// If the first request cannot be rendered.
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
         wish.check_cards()?;
@@ -118,7 +119,7 @@ impl View {
         })
     }
 
-    /// Adds a page, which steers if no other does.
+    /// Adds a page. If no other page steers (controls the view), the new page steers.
     pub(super) fn connect(&mut self) -> PageNumber {
         let number = self.next_page;
         self.next_page += 1;
@@ -184,7 +185,7 @@ impl View {
         }
     }
 
-    /// If the page steers, records the number of its message; the next state repeats it.
+    /// If the page steers, records the number of its message; the next state message repeats this number.
     fn note(&mut self, number: PageNumber, id: Option<u64>) {
         if let Some(id) = id.filter(|_| self.steering == Some(number)) {
             self.message = id;
@@ -252,7 +253,7 @@ impl View {
         Ok(())
     }
 
-    /// Makes `wish` the newest wish, if it differs from the present one.
+    /// Makes `wish` the newest request, if it differs from the present one.
     pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
             // A new state tells the page that its message was received.
@@ -271,8 +272,8 @@ impl View {
         Ok(())
     }
 
-    /// Drops tiles that pages must not show any more. Tiles of an older wish whose first pass must be
-    /// completed stay until the newest wish has a tile.
+    /// Drops tiles that pages must not show any more. Tiles of an older request whose first pass must be
+    /// completed stay until the newest request has a tile.
     pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),
@@ -282,8 +283,8 @@ impl View {
         self.revisions.state += 1;
     }
 
-    /// Number of the wish whose running pass is shown to pages: a pass that must not stop, and whose picture
-    /// has the present size. `None` without such a pass.
+    /// Number of the request whose running pass is shown to pages; `None` if no pass runs, if it must stop,
+    /// or if its picture has an earlier size.
     pub(super) fn spared(&self) -> Option<u32> {
         self.refinement.spares().filter(|version| *version >= self.of_size)
     }
@@ -294,8 +295,8 @@ impl View {
         }
     }
 
-    /// Selects what a page shows. A layer that chips render on request makes a new wish, if it is not
-    /// rendered yet.
+    /// Selects what a page shows. If it is a layer that chips render only on request, and is not rendered
+    /// yet, the requested picture is rendered again with all layers.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
         let mut wish = self.wish.clone();
         if shown.is_of_chip() && wish.add_layers() {
@@ -350,7 +351,7 @@ impl View {
         })
     }
 
-    /// Gives a scene the materials and lights of a wish.
+    /// Gives a scene the materials and lights of a request.
     ///
     /// # Errors
     /// If an assignment is not possible, or no light is left.
@@ -358,7 +359,7 @@ impl View {
         self.start.sketch.apply(wish, scene)
     }
 
-    /// Words of the command that renders the settled picture.
+    /// Words of the command that renders the final picture of the newest request.
     pub(super) fn command(&self) -> Vec<String> {
         let Start { options, quality, finish, .. } = &self.start;
         command_line::words(options, *quality, *finish, &self.wish)
@@ -395,13 +396,13 @@ impl View {
         })
     }
 
-    /// Newest wish.
+    /// Newest request.
     #[cfg(test)]
     pub(super) fn wish(&self) -> &Wish {
         &self.wish
     }
 
-    /// Returns whether the picture of the newest wish is settled.
+    /// Returns whether the final picture of the newest request is complete.
     #[cfg(test)]
     pub(super) fn is_settled(&self) -> bool {
         self.refinement.is_settled()
@@ -413,7 +414,7 @@ impl View {
         self.canvas.len()
     }
 
-    /// Number of the newest wish.
+    /// Number of the newest request.
     pub(super) fn version(&self) -> u32 {
         self.refinement.version()
     }

@@ -1,4 +1,4 @@
-//! Wish: settings, camera and changes of the scene of the picture that pages request.
+//! Wish: the picture that pages request, by its settings, its camera and changes of the scene.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use photoncard_driver::scene::{Environment, Scene, SceneContents};
 
 use super::request::Setting;
 
-/// `--ic-error` when a page switches on the irradiance cache and the quality states no error.
+/// Value of `--ic-error` if a page switches on the irradiance cache and the quality has none.
 const IRRADIANCE_ERROR: f32 = 0.1;
 
-/// Settings, camera and changes of the scene that pages request.
+/// Picture that pages request: settings, camera, and changes of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Wish {
-    /// Settings of the settled picture.
+    /// Settings of the final picture.
     pub(super) settings: RenderSettings,
     /// Settings that an option or a page has stated. A quality does not change them.
     stated: Stated,
@@ -30,7 +30,7 @@ impl Wish {
         Self { settings, stated, given, edits: Vec::new() }
     }
 
-    /// Returns whether no setting is left to a quality's pilot.
+    /// Returns whether no setting is left for pilot renders to choose.
     pub(super) fn states_all(&self) -> bool {
         !self.stated.needs_fit()
     }
@@ -61,7 +61,6 @@ impl Wish {
         }
     }
 
-    /// Changes a setting.
     pub(super) fn change(&mut self, setting: Setting) {
         let RenderSettings { photons, integrator, schedule, .. } = &mut self.settings;
         let stated = &mut self.stated;
@@ -85,7 +84,8 @@ impl Wish {
         }
     }
 
-    /// Checks the settings against the budgets of emulated cards. Those of remote cards are not known here.
+    /// Checks the settings against the budgets of emulated cards. The budgets of remote cards are not known
+    /// here.
     ///
     /// # Errors
     /// The first setting that exceeds the budget of a card.
@@ -96,7 +96,7 @@ impl Wish {
         })
     }
 
-    /// Copy of this wish with the settings of another. It keeps its own picture (camera, size, layers) and
+    /// Copy of this request with the settings of `other`, but its own picture (camera, size, layers) and
     /// assignments.
     pub(super) fn by_settings_of(&self, other: &Self) -> Self {
         let picture = self.settings.picture.clone();
@@ -119,25 +119,25 @@ impl Wish {
         fit.apply(&mut self.settings, self.stated);
     }
 
-    /// Returns whether another wish differs in the scene or in the settings of the photons, so that photons
-    /// must be traced again.
+    /// Returns whether `other` differs in the scene or in the photons' settings: photons must then be traced
+    /// again.
     pub(super) fn is_other_edition(&self, other: &Self) -> bool {
         let photons = |wish: &Self| (wish.settings.photons.clone(), wish.settings.integrator.seed);
         self.given != other.given || self.edits != other.edits || photons(self) != photons(other)
     }
 }
 
-/// Numbers with commas between them, which parse to the same bits.
+/// Joins numbers by commas; each number in the text parses to the same bits.
 pub(super) fn numbers<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// Scene with one triangle for each material in use, on which wishes are checked quickly.
+/// Reduced scene for quick checks of requests: one triangle for each material in use.
 pub(super) struct Sketch(Scene);
 
 impl Sketch {
-    /// Creates the sketch of a scene without assignments. Its environment is one texel, with the brightest
-    /// channel value of the scene's.
+    /// Creates the sketch of a scene without assignments. The sketch's environment is one texel: the maximum
+    /// channel value in the scene's environment.
     pub(super) fn new(scene: &Scene) -> Self {
         let mut materials = BTreeSet::new();
         let triangles = scene.stored_triangles().filter(|triangle| materials.insert(triangle.material));
@@ -157,7 +157,7 @@ impl Sketch {
         }))
     }
 
-    /// Scene of the sketch with the assignments of a wish.
+    /// Scene of the sketch with the assignments of a request.
     ///
     /// # Errors
     /// If an assignment, a setting or the camera is invalid, or no light is left.
@@ -169,7 +169,8 @@ impl Sketch {
         Ok(scene)
     }
 
-    /// Gives a scene the sketch's materials, lights and environment strength, with the assignments of a wish.
+    /// Gives a scene the sketch's materials, lights and environment strength, with the assignments of a
+    /// request.
     ///
     /// # Errors
     /// If an assignment is invalid, or no light is left.

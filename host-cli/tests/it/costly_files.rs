@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 const SECONDS: u32 = 100;
 const KILOBYTES: u32 = 4_000_000;
 
-/// Runs the command with limited address space and processor time. At the end of the time a signal ends it,
-/// and it has no exit status.
+/// Runs the command with limited address space and processor time. If the time is used up, a signal ends the
+/// command, and the outcome has no exit status.
 fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     let mut shell = std::process::Command::new("sh");
     let script = format!("ulimit -v {KILOBYTES} && ulimit -t {SECONDS} && exec \"$0\" \"$@\"");
@@ -36,7 +36,7 @@ fn refused_scene(json: &Value, bytes: &[u8], words: &[&str]) {
     refused(&room, words);
 }
 
-/// Checks that a scene is refused whose JSON array `list` has `count` nearly empty elements.
+/// Checks that a scene is refused if its JSON array `list` has `count` nearly empty elements.
 fn refused_list(list: &str, element: &str, count: usize) {
     let room = Room::new();
     let mut elements = vec![element; count - 1].join(",");

@@ -20,7 +20,7 @@ fn count(statistics: &Value, pointer: &str, key: &str) -> u64 {
     count.unwrap_or_else(|| panic!("no memory/{pointer}/{key} in {statistics:#}"))
 }
 
-/// Sum of a counter over the parts `names` of `part`.
+/// Sum of the counter `key` at `/memory/PART/NAME` in the statistics over all `names`.
 fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
     names.iter().map(|name| count(statistics, &format!("{part}/{name}"), key)).sum()
 }

@@ -101,7 +101,7 @@ fn parts_are_denoised_when_they_are_merged() {
     }
 }
 
-/// By `--denoise`, a quality chooses other settings for the prepared scene.
+/// With `--denoise`, a quality chooses other settings for the prepared scene.
 #[test]
 fn a_scene_is_prepared_for_pictures_that_are_denoised() {
     let room = Room::new();

@@ -2,7 +2,7 @@
 
 use crate::support::Room;
 
-/// Long options with which lines of `text` begin, behind their short forms.
+/// Returns the first long option of each line of `text` that begins with an option, such as `-o, --output`.
 fn options(text: &str) -> Vec<&str> {
     let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
     lines.filter_map(|line| line.split([' ', ',', '[']).find(|word| word.starts_with("--"))).collect()

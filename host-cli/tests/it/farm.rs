@@ -1,5 +1,5 @@
-//! Farm jobs are run, some without their engines. Their picture has the bytes of the picture of a single
-//! render.
+//! Tests that run farm jobs, some without their engines. The picture of a job must equal that of a single
+//! render, byte for byte.
 #![cfg(unix)]
 
 use std::process::Command;
@@ -12,7 +12,7 @@ const FOLDER: &str = "it's a {{Param.x}} $HOME";
 const SCENE: &str = "a {1} \"b\" {}.gltf";
 const PICTURE: &str = "o{{}}ut `id`.exr";
 
-/// Options of a small picture. The last two leave nothing to a pilot.
+/// Options of a small picture. With the last two, no setting is left for a pilot render to choose.
 const OPTIONS: [&str; 17] = [
     "--quality",
     "draft",
@@ -33,7 +33,8 @@ const OPTIONS: [&str; 17] = [
     "--ic-error=0.1",
 ];
 
-/// Room with the scene in [`FOLDER`], and the bytes of the scene's EXR by a single render.
+/// Returns a temporary folder with the scene in its subfolder [`FOLDER`], and the EXR that a single render
+/// writes.
 fn room() -> (Room, Vec<u8>) {
     let room = Room::new();
     std::fs::create_dir(room.path(FOLDER)).unwrap();

@@ -1,5 +1,5 @@
-//! Frames of animations: each equals the picture of its own command, and no lines are sent again if only the
-//! camera moves.
+//! Frames of animations. Each frame equals the picture of a command for this frame alone. If only the camera
+//! moves, nothing of the card image is sent again.
 
 use crate::support::{Outcome, Room, scene_bytes, scene_of, shipped};
 use serde_json::{Value, json};
@@ -76,7 +76,7 @@ fn no_card_is_loaded_twice_for_cameras_that_move() {
     }
 }
 
-/// A quality's settings are chosen for the scene at rest, so that frames of different machines match.
+/// A quality chooses settings for the scene without animation: frames of different machines therefore match.
 #[test]
 fn a_frame_is_the_same_after_others_and_alone_on_other_cards() {
     let room = Room::new();

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::support::{Outcome, Room, shipped};
 
-/// Runs `package.sh` in the room.
+/// Runs `package.sh` in the folder `room`.
 fn package(room: &Room, arguments: &[&str]) -> Outcome {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/package.sh");
     let mut command = Command::new("timeout");

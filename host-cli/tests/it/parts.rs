@@ -4,7 +4,7 @@ use std::process::Command;
 
 use crate::support::{Outcome, Room, shipped};
 
-/// Options of a picture with 16 patches.
+/// Options of a picture with 16 patches, the squares of pixels that are dealt to the parts.
 const PICTURE: [&str; 10] =
     ["--size", "64x48", "--crop", "3,64,0,47", "--photons", "800", "--gather-rays", "8", "--spp", "2"];
 

@@ -1,5 +1,5 @@
-//! The provenance in a picture has every setting that pixels depend on; that in the statistics also what the
-//! work depends on.
+//! Provenance: in a picture, it has every setting that pixels depend on; in the statistics, also the settings
+//! that the work depends on.
 
 use std::collections::BTreeSet;
 
@@ -76,7 +76,7 @@ const OTHERS: [&[&str]; 25] = [
     &["--stats", "a.json"],
 ];
 
-/// Options of storage, which the file itself states, of denoising, which adds a layer, and of messages.
+/// Options of the file's storage, of denoising and of messages: no rendered pixel depends on them.
 const OF_THE_FILE: [&str; 6] = ["--output", "--sample-type", "--denoise", "--quiet", "--progress", "--help"];
 
 /// Option that pixels depend on, for scenes with variants. No shipped scene has variants.
@@ -88,7 +88,7 @@ const OF_FRAMES: [&str; 3] = ["--frames", "--animation", "--fps"];
 /// Options of prepared scenes and parts, which other tests check.
 const OF_FARMS: [&str; 2] = ["--part", "--prepared"];
 
-/// Options that determine the number of samples by an aim.
+/// Options that end a render at a time or noise, and thus determine the number of samples.
 const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
 
 /// Provenance in an EXR file: the text of its attribute `photoncard`.

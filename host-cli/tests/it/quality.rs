@@ -3,7 +3,7 @@
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Keys in the provenance of settings that a quality chooses.
+/// Settings that a quality chooses, by their keys in the provenance.
 const FOUND: [&str; 5] = ["spp", "photons", "gather-rays", "shadow-rays", "ic-error"];
 
 /// Renders the Cornell box at 12x12 pixels with the quality `draft`. Returns the outcome and the statistics.

@@ -1,5 +1,4 @@
-//! Renders that end early, by the loss of the card or its link or by the end of the host: finished tiles are
-//! kept.
+//! Renders that end early because the card, its link or the host fails: finished tiles are kept.
 #![cfg(unix)]
 
 #[cfg(target_os = "linux")]

@@ -13,7 +13,7 @@ use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-/// Card memory with one data line stuck at 1.
+/// Card memory in which bit 4 of each word is stuck at 1.
 struct StuckLine(Vec<Line>);
 
 impl MemoryPort for StuckLine {
@@ -40,7 +40,7 @@ impl CardMemory for StuckLine {
     }
 }
 
-/// Output of the self-test of a card with `lines` lines of such memory.
+/// Output of the self-test of a card with `lines` lines of memory that has a stuck data line.
 fn tested(lines: usize) -> crate::support::Outcome {
     let listener = Listener::new(&"tcp:0".parse().unwrap()).unwrap();
     let address = listener.card_address().to_owned();

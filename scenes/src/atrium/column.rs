@@ -1,4 +1,4 @@
-//! Columns, pedestals and balusters, which are surfaces of revolution about the y axis.
+//! Columns, piers and balusters, made of surfaces of revolution and square blocks about the y axis.
 
 use super::dimensions::{EMBED, GALLERY_FLOOR, GROUND_SPRINGING, STEP_TOP, UPPER_SPRINGING};
 use crate::mesh::Mesh;

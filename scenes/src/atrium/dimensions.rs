@@ -1,23 +1,21 @@
 //! Dimensions of the atrium, metres.
 //!
-//! The arcades stand on the centre line of a rectangle of 24 by 9 m about the origin. The local frame of a
-//! side has x along the arcade, y up and z outwards, with z = 0 on the centre line. An *offset* is a z in
-//! that frame. Adjacent parts overlap slightly, so that no two surfaces are coplanar.
+//! The centre lines of the four arcades form a rectangle of 24 by 9 m about the origin. Each side of the
+//! court has a local frame: x along the arcade, y up, z outwards, with z = 0 on the centre line. An *offset*
+//! is a z coordinate in this frame. Adjacent meshes overlap slightly, so that no two surfaces are coplanar.
 
 use glam::Vec2;
 
-/// Half the size in x and z of the rectangle that the centre lines of the arcades form, metres.
+/// Half the size in x and z of the rectangle of the arcades' centre lines, metres.
 pub(super) const HALF: Vec2 = Vec2::new(12.0, 4.5);
 
 /// Distance between the columns of the ground floor's arches, metres. The upper arches are half as wide.
 pub(super) const BAY: f32 = 3.0;
 
-/// Offsets (z in the local frame of a side, metres) of the inner and the outer border of the corridor's clear
-/// space.
+/// Offsets of the inner and the outer border of the corridor's clear space, metres.
 pub(super) const CORRIDOR: [f32; 2] = [0.3, 3.3];
 
-/// Offsets (z in the local frame of a side, metres) of the outer wall's inner face, which is the back of the
-/// niches, and of its outer face.
+/// Offsets of the outer wall's inner face (the back of the niches) and of its outer face, metres.
 pub(super) const OUTER_WALL: [f32; 2] = [3.6, 3.9];
 
 /// Height of the top of the steps on which the arcade stands, metres.
@@ -41,5 +39,5 @@ pub(super) const GROUND_ARCH: [f32; 2] = [1.15, 0.3];
 /// Radius of the upper arches, and half the thickness of their wall, metres.
 pub(super) const UPPER_ARCH: [f32; 2] = [0.55, 0.2];
 
-/// Depth by which adjacent parts overlap, metres.
+/// Depth by which adjacent meshes overlap, metres.
 pub(super) const EMBED: f32 = 0.02;

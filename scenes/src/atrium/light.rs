@@ -1,16 +1,16 @@
 //! Sky over the court, and the sun in it.
 //!
-//! The space beyond the scene is black. The sky is therefore an emissive wedge on the roof that closes the
-//! opening, low in the north and high in the south. The wedge's shape is invisible, because its radiance is
-//! uniform. The wedge is small, because light from one part of it to another is lost. The sun is in its high
-//! corner, so that sunlight passes the southern eaves obliquely and reaches the northern side.
+//! The sky is an emissive wedge that closes the opening of the roof, low in the north and high in the south.
+//! Its shape is invisible, because its radiance is uniform. The wedge is small, because light from one of its
+//! faces to another is lost. The sun is in the high corner of the wedge, so that sunlight passes the southern
+//! eaves obliquely and reaches the northern side.
 
 use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// Extent of the sky, metres: half its width in x, the heights of its foot, which is within the roof, and of
-/// its top, and the z of its south and its north end.
+/// Extent of the sky, metres: half its width in x; heights of its lower edge (inside the roof) and its top; z
+/// of its south and north end.
 const SKY_X: f32 = 13.3;
 const SKY_Y: [f32; 2] = [9.2, 12.9];
 const SKY_Z: [f32; 2] = [-7.4, 5.6];

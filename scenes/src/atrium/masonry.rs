@@ -7,18 +7,18 @@ use crate::mesh::{Mesh, on_circle};
 
 /// Wall panel with one opening that is round at its top and centred on x = 0.
 ///
-/// The panel has no ends, top or underside, because they would lie within adjacent parts.
+/// The panel has no end, top or bottom faces, because they would lie inside adjacent masonry.
 pub(super) struct ArchedPanel {
     pub(super) width: f32,
     pub(super) bottom: f32,
     pub(super) springing: f32,
     pub(super) top: f32,
     pub(super) radius: f32,
-    /// Offsets of the front and the back face.
+    /// Offsets (z) of the front and the back face, metres.
     pub(super) faces: [f32; 2],
     /// Number of segments per quarter circle of the arch.
     pub(super) segments: usize,
-    /// Number of strips between the opening and the outline.
+    /// Number of strips of faces between the opening and the panel's outline.
     pub(super) strips: usize,
 }
 
@@ -44,7 +44,8 @@ impl ArchedPanel {
         mesh
     }
 
-    /// Points of the opening from right to left, each with the corresponding point of the panel's outline.
+    /// Returns the points of the opening's edge from right to left, each with the corresponding point of the
+    /// panel's outline.
     fn outline(&self) -> Vec<[Vec2; 2]> {
         let half = self.width / 2.0;
         let mut right = Vec::new();
@@ -106,8 +107,8 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
 /// The vault extends into the walls at both ends of z and, with `all_round`, also of x.
 pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh {
     const STEPS: usize = 10;
-    // Position and height of the lines between a cylinder's facets. Their angles are equidistant, so that the
-    // facets are equal.
+    // Position across the vault and height of the lines between a cylinder's facets. The angles of the lines
+    // are equidistant, so that the facets are equal.
     let line = |index: usize| on_circle(STEPS - index, 2 * STEPS) * radius;
     let walled = |index: usize| match index {
         0 => Vec2::new(-radius - EMBED, 0.0),
@@ -132,7 +133,8 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
 
 /// Sweeps a profile around the court, with mitred corners.
 ///
-/// `profile` is a closed polygon of offset and height, counter-clockwise if offsets point to the right.
+/// `profile` is a closed polygon of (offset, height) in metres, counter-clockwise if offsets point to the
+/// right.
 pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     const STEPS: [usize; 2] = [16, 6];
     // Corners of the court in units of its half size. The first side leads from -x to +x at +z.
@@ -152,8 +154,8 @@ pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     mesh
 }
 
-/// Square slabs of side `size`, metres, on y = 0. There is a slab in each column and row, from `min` to
-/// before `max`, for which `chosen` returns true.
+/// Square slabs of side `size`, metres, at y = 0. Columns and rows run from `min` to `max`, exclusive. A slab
+/// is laid where `chosen(column, row)` is true.
 pub(super) fn paving(min: [i32; 2], max: [i32; 2], size: f32, chosen: impl Fn(i32, i32) -> bool) -> Mesh {
     let mut mesh = Mesh::default();
     for column in min[0]..max[0] {

@@ -68,14 +68,14 @@ const SIDES: [Plan; 4] = [
     },
 ];
 
-/// Court under its own sky and sun.
+/// Returns the court with an emissive sky and sun as a `.glb` file.
 pub(crate) fn atrium() -> Vec<u8> {
     let mut scene = lit_court();
     place_cameras(&mut scene);
     scene.into_glb()
 }
 
-/// Court under its own sky and sun, without cameras.
+/// Court with an emissive sky and sun, without cameras.
 fn lit_court() -> SceneBuilder {
     let (mut scene, colours) = court();
     scene.object("sky", &light::sky(), colours.sky);
@@ -83,7 +83,7 @@ fn lit_court() -> SceneBuilder {
     scene
 }
 
-/// Court without lights, for an environment map.
+/// Returns the court without lights as a `.glb` file, to be lit by an environment map.
 pub(crate) fn open() -> Vec<u8> {
     let (mut scene, _) = court();
     place_cameras(&mut scene);
@@ -104,8 +104,7 @@ fn court() -> (SceneBuilder, Palette) {
     (scene, colours)
 }
 
-/// Adds the parts that surround the whole court: steps, cornices with the floors behind them, rails, outer
-/// wall.
+/// Adds the objects that surround the whole court: steps, gallery floor, cornice, roof, outer wall and rails.
 fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     let steps = [[-0.9, -0.1], [0.62, -0.1], [0.62, STEP_TOP], [-0.6, STEP_TOP], [-0.6, 0.08], [-0.9, 0.08]];
     scene.object("steps", &masonry::ring(&steps), colours.trim);
@@ -156,7 +155,8 @@ fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     scene.object("hand-rail", &masonry::ring(&hand), colours.trim);
 }
 
-/// Adds slabs of two kinds of stone in the court, and of stone and terracotta in the corridors.
+/// Adds the slabs of the floor: light and dark stone in the court, light stone and terracotta in the
+/// corridors.
 fn build_floor(scene: &mut SceneBuilder, colours: &Palette) {
     const SLAB: f32 = 0.75;
     const OUTER: [i32; 2] = [21, 11];

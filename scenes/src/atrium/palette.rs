@@ -3,7 +3,7 @@
 use crate::builder::SceneBuilder;
 use crate::material::Material;
 
-/// Indices of the materials in the file.
+/// Indices of the materials in the glTF file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Palette {
     pub(super) stone: usize,

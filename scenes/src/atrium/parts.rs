@@ -12,7 +12,7 @@ use super::{column, furnishing};
 use crate::builder::SceneBuilder;
 use crate::mesh::Mesh;
 
-/// Indices of the meshes in the file.
+/// Indices of the meshes in the glTF file.
 pub(super) struct Parts {
     pub(super) ground_arch: usize,
     pub(super) ground_column: usize,
@@ -100,7 +100,7 @@ impl Parts {
         parts
     }
 
-    /// Adds curtains and banners. The four colours of a cloth share its vertices.
+    /// Adds the meshes of curtains and banners. Meshes of different colours share their vertices.
     fn hang_cloths(&mut self, scene: &mut SceneBuilder, colours: &Palette) {
         let curtain = scene.geometry(&furnishing::curtain());
         let rod = scene.geometry(&furnishing::curtain_rod());
@@ -204,7 +204,7 @@ fn pilaster() -> Mesh {
     mesh
 }
 
-/// Beam under the gallery's ceiling, with the pilaster that supports it.
+/// Beam under the gallery's ceiling, and the pilaster that supports the beam.
 fn beam() -> Mesh {
     let wall = CORRIDOR[1];
     let mut mesh = Mesh::default();
@@ -213,7 +213,7 @@ fn beam() -> Mesh {
     mesh
 }
 
-/// Back wall beyond the last bay, of both storeys; its near end is at x = 0.
+/// Back wall beyond the last bay, as high as both storeys. Its end next to the bay is at x = 0.
 fn corner_wall() -> Mesh {
     let [inner, outer] = [CORRIDOR[1], OUTER_WALL[0]];
     let mut mesh = Mesh::default();

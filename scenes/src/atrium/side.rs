@@ -1,4 +1,4 @@
-//! Side of the court: its arcades, the corridors behind them, and their furnishing.
+//! One of the four sides of the court: its arcades, the corridors behind them, and their furnishing.
 
 use glam::Vec3;
 
@@ -7,15 +7,14 @@ use super::parts::Parts;
 use crate::builder::SceneBuilder;
 use crate::document::Node;
 
-/// Cloths in or below the upper arches: index of the arch and index of the colour.
+/// Cloths (curtains or banners) at the upper arches: for each, the index of the arch and of the colour.
 pub(super) type Hangings = &'static [(usize, usize)];
 
-/// Plan of a side: its name, size, local frame and cloths.
+/// Plan of a side of the court: its name, number of bays, local frame and cloths.
 pub(super) struct Plan {
     pub(super) name: &'static str,
     pub(super) bays: usize,
-    /// Local x axis in world space. It is parallel to an axis of world space, so that no coordinate is
-    /// rounded.
+    /// Local x axis in world space. It is parallel to a world axis, so that no coordinate is rounded.
     pub(super) x_axis: [f32; 3],
     /// Local z axis in world space.
     pub(super) z_axis: [f32; 3],
@@ -24,7 +23,7 @@ pub(super) struct Plan {
     pub(super) banners: Hangings,
 }
 
-/// Adds the nodes of a side as children of one root node.
+/// Adds the nodes of a side of the court as children of one root node.
 pub(super) fn build(scene: &mut SceneBuilder, parts: &Parts, plan: &Plan) {
     let half = plan.bays as f32 * BAY / 2.0;
     let mut side = Side { scene, parts, half, bays: plan.bays, children: Vec::new() };
@@ -59,13 +58,13 @@ impl Side<'_> {
         self.children.push(self.scene.node(node));
     }
 
-    /// Local x of the centre of upper arch `index`.
+    /// Returns the local x, metres, of the centre of upper arch `index`.
     fn upper_arch(&self, index: usize) -> f32 {
         BAY / 2.0 * (index as f32 + 0.5) - self.half
     }
 
-    /// Local x of the borders between bays, and of the centres of the gaps between the outer bays and the
-    /// corners.
+    /// Returns the local x, metres, of the borders between bays, and of the middle of the gap at each end of
+    /// the arcade.
     fn joints(&self) -> Vec<f32> {
         let end = self.half + CORRIDOR[0] / 2.0;
         let between = (1..self.bays).map(|index| BAY * index as f32 - self.half);
@@ -131,8 +130,7 @@ impl Side<'_> {
     }
 }
 
-/// Adds a root node with the mesh of index `mesh` at `place` in world space, metres. The mesh is scaled by
-/// `scale`.
+/// Adds a root node with mesh `mesh`, scaled by `scale`, at the world position `place`, metres.
 pub(super) fn stand(scene: &mut SceneBuilder, name: &str, mesh: usize, place: Vec3, scale: f32) {
     let scale = (scale != 1.0).then_some([scale; 3]);
     let translation = Some(place.to_array());

@@ -1,4 +1,4 @@
-//! Walk through the court, past the fountain and up to the far arcade.
+//! Animation of a camera that walks through the court, past the fountain and up to the far arcade.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::{LENS, lit_court};
 use crate::builder::Camera;
 use crate::motion::{Between, Track, Values};
 
-/// Time between two views, seconds.
+/// Time between two consecutive views, seconds.
 const INTERVAL: f32 = 2.0;
 
 /// Positions of the eye and of its target, metres. The first pair is that of the atrium's camera `court`.
@@ -19,7 +19,7 @@ const VIEWS: [[[f32; 3]; 2]; 6] = [
     [[7.4, 1.8, -0.4], [14.0, 3.4, 0.4]],
 ];
 
-/// Court under its sky and sun, seen by a camera that walks for ten seconds.
+/// Returns, as a `.glb` file, the court with its sky and sun and a camera that walks for ten seconds.
 pub(crate) fn walk() -> Vec<u8> {
     let mut scene = lit_court();
     let (yfov, aspect_ratio) = LENS;

@@ -23,8 +23,8 @@ const BACK: Quad = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [-1
 const GREEN_WALL: Quad = [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
 const RED_WALL: Quad = [[-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0]];
 
-/// Box that stands on the floor or slightly in it: x and z of its four corners, and the heights of its bottom
-/// and top, metres.
+/// Box on the floor, or slightly sunk into it: (x, z) of its four corners, and the heights of its bottom and
+/// top, metres.
 struct StandingBox {
     footprint: [[f32; 2]; 4],
     bottom: f32,
@@ -58,29 +58,28 @@ const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
 const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
 const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 
-/// Geometry of a lamp that faces upwards and of the cup around it: corners of the lamp, half the cup's side,
-/// and the heights of its bottom and rim, metres.
+/// Geometry of a lamp that faces upwards and of the square cup around it: corners of the lamp; half the cup's
+/// side and the heights of the cup's bottom and rim, metres.
 const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
 const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
 const CUP_ALBEDO: [f64; 3] = [0.1; 3];
-/// Radiance of the upward lamp, W/(sr m^2). This lamp has a third of the area of the lamp in the ceiling, and
-/// emits the same power.
+/// Radiance of the upward lamp, W/(sr m^2). The lamp has a third of the area of the ceiling lamp, and emits
+/// the same power.
 const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
 
 /// Centres and radius of the balls, metres. They float slightly above the floor.
 const MIRROR_BALL: [f32; 3] = [-0.45, -0.58, -0.4];
 const GLASS_BALL: [f32; 3] = [0.42, -0.58, 0.3];
 const BALL_RADIUS: f32 = 0.4;
-/// Clear glass that is tinted like a bottle where it is thick.
+/// Clear glass with a slight green absorption tint, like a bottle.
 const GLASS: Glass =
     Glass { ior: 1.5, thickness: 0.8, attenuation_colour: [0.8, 0.93, 0.86], attenuation_distance: 1.0 };
 
-/// Camera whose picture is filled by the open side of the box.
+/// Camera in front of the open side of the box, which fills the picture.
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
 
-/// Camera that looks down from close by, so that the floor fills the picture from its open edge to the back
-/// wall.
+/// Camera that looks down from close by. The floor, from its open edge to the back wall, fills the picture.
 const TOWARDS_FLOOR: Camera = Camera {
     eye: Vec3::new(-0.15, 0.5, 1.75),
     target: Vec3::new(-0.15, -1.0, 0.2),
@@ -100,8 +99,8 @@ fn standing_box(shape: &StandingBox) -> Mesh {
     mesh
 }
 
-/// Creates the box with its blocks and a lamp. The floor has the material `floor`, by default that of the
-/// white walls.
+/// Creates the box with its blocks and a lamp. The floor has the material `floor`; `None` stands for the
+/// material of the white walls.
 fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> SceneBuilder {
     let (mut scene, white) = empty_box(floor, add_lamp);
     scene.object("small-box", &standing_box(&SMALL_BOX), white);
@@ -110,7 +109,8 @@ fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> Sce
     scene
 }
 
-/// Creates the box with a lamp and without blocks. Returns it with the index of the white walls' material.
+/// Creates the box with a lamp and without blocks. Returns the box and the index of the white walls'
+/// material.
 fn empty_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> (SceneBuilder, usize) {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));
@@ -152,13 +152,13 @@ pub(crate) fn glossy_floor() -> Vec<u8> {
     scene.into_gltf()
 }
 
-/// Lambertian box with a lamp in a cup that illuminates only a spot of the ceiling, so that nearly all light
-/// is indirect.
+/// Lambertian box with a lamp in a cup. The lamp illuminates only a spot of the ceiling, so that nearly all
+/// light is indirect.
 pub(crate) fn uplight() -> Vec<u8> {
     cornell_box(None, add_uplight).into_gltf()
 }
 
-/// Mirror ball and glass ball between Lambertian walls, which cause caustics.
+/// Lambertian box with a mirror ball and a glass ball, which cause caustics.
 pub(crate) fn spheres() -> Vec<u8> {
     let (mut scene, _) = empty_box(None, add_ceiling_lamp);
     let mirror = scene.material(&Material::metallic_roughness("mirror", [1.0; 3], 1.0, 0.0));

@@ -10,11 +10,11 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::motion::{Between, Track, Values};
 
-/// Time between two keyframes, seconds. All animations have five keyframes, and end as they begin.
+/// Time between two keyframes, seconds. All animations have five keyframes; the last equals the first.
 const INTERVAL: f32 = 0.5;
 
-/// Geometry of the lamp: position of its pivot, length of its rod, half its side, metres, and its maximum
-/// angle, radians.
+/// Geometry of the lamp: position of its pivot, distance from the pivot to its centre, half its side, metres,
+/// and its maximum angle, radians.
 const PIVOT: Vec3 = Vec3::new(0.0, 0.98, 0.35);
 const ROD: f32 = 0.6;
 const LAMP: f32 = 0.09;
@@ -36,7 +36,8 @@ const TURN: f32 = 0.3;
 const BLOCK: Vec3 = Vec3::new(0.45, -0.7, 0.2);
 const SIDE: f32 = 0.3;
 
-/// Box with two animations: `play` moves lamp, reed and block, `pan` moves the camera.
+/// Returns the box, as a `.glb` file, with two animations: `play` moves lamp, reed and block; `pan` moves the
+/// camera.
 pub(crate) fn moving() -> Vec<u8> {
     let (mut scene, white) = empty_box(None, add_ceiling_lamp);
     let lamp = add_swinging_lamp(&mut scene);
@@ -67,13 +68,14 @@ pub(crate) fn moving() -> Vec<u8> {
     scene.into_glb()
 }
 
-/// Quaternion of a rotation about `axis` by twice the angle `half`, radians.
+/// Returns the quaternion of a rotation about `axis` by the angle `2 half`, radians.
 fn quaternion(axis: Vec3, half: f32) -> Quat {
     let (sine, cosine) = (libm::sin(f64::from(half)) as f32, libm::cos(f64::from(half)) as f32);
     Quat::from_vec4((axis * sine).extend(cosine))
 }
 
-/// Adds an emissive block on a rod with a point light below it; returns the node that is rotated.
+/// Adds a pendulum: an emissive block `ROD` below a pivot, and a point light below the block. Returns the
+/// pivot's node, which is animated.
 fn add_swinging_lamp(scene: &mut SceneBuilder) -> usize {
     let material = scene.material(&Material::diffuse("lantern", WHITE).emitting(LAMP_RADIANCE));
     let mut shape = Mesh::default();
@@ -90,7 +92,7 @@ fn add_swinging_lamp(scene: &mut SceneBuilder) -> usize {
     scene.root(Node { name: "pendulum".into(), translation, children, ..Node::default() })
 }
 
-/// Adds a tall prism with two joints; returns the nodes of the joints.
+/// Adds a tall prism with a skin of two joints; returns the nodes of the joints, the lower first.
 fn add_reed(scene: &mut SceneBuilder) -> [usize; 2] {
     let material = scene.material(&Material::diffuse("reed", [0.2, 0.5, 0.7]));
     let corners = [[-REED, REED], [REED, REED], [REED, -REED], [-REED, -REED]];

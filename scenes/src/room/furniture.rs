@@ -60,8 +60,8 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// Side of the drum as a strip: alternating top and bottom vertices, counter-clockwise seen from above, with
-/// the seam twice.
+/// Side of the drum as a triangle strip: alternating top and bottom vertices, counter-clockwise seen from
+/// above. The vertices of the seam occur twice.
 pub(super) fn drum_side() -> Mesh {
     let mut mesh = Mesh::default();
     for segment in 0..=DRUM_SEGMENTS {
@@ -77,7 +77,7 @@ pub(super) fn drum_side() -> Mesh {
     mesh
 }
 
-/// Head of the drum as a fan: its centre, then the rim counter-clockwise seen from above.
+/// Head of the drum as a triangle fan: its centre, then its rim counter-clockwise seen from above.
 pub(super) fn drum_head() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.positions.push(Vec3::Y * DRUM_HEIGHT);
@@ -91,7 +91,8 @@ pub(super) fn drum_head() -> Mesh {
     mesh
 }
 
-/// Node of the drum. Its scale mirrors the mesh, so that a reader must flip the winding to keep the front.
+/// Node of the drum. Its negative scale mirrors the mesh, so that a glTF loader must reverse the winding of
+/// the triangles.
 pub(super) fn drum_node(mesh: usize) -> Node {
     Node {
         name: "drum".into(),

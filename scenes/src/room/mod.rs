@@ -25,7 +25,7 @@ const PAINTING: &[u8] = include_bytes!("painting.jpg");
 /// Texture coordinates that map the whole image to a quadrilateral whose first corner is at the lower left.
 const WHOLE: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
 
-/// Indices of textures in the file.
+/// Indices of the textures in the glTF file.
 struct Textures {
     planks: usize,
     wallpaper: usize,
@@ -54,7 +54,7 @@ impl Textures {
     }
 }
 
-/// Scene as a `.glb` file.
+/// Returns the scene as a `.glb` file.
 pub(crate) fn room() -> Vec<u8> {
     let mut scene = SceneBuilder::default();
     let textures = Textures::new(&mut scene);

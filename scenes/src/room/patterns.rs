@@ -1,10 +1,11 @@
-//! Patterns of the room's textures. No pattern equals its mirror image, so that wrong mappings are visible.
+//! Patterns of the room's textures. No pattern equals its mirror image, so that errors of texture mapping are
+//! visible.
 
 use core::f32::consts::TAU;
 
 use super::picture::Picture;
 
-/// Hash of two numbers. The hash is from 0 to 255.
+/// Returns a hash, 0 to 255, of two numbers.
 fn hash(a: u32, b: u32) -> u32 {
     let mut value = a.wrapping_mul(0x9e37_79b1) ^ b.wrapping_mul(0x85eb_ca77);
     value = (value ^ (value >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -36,7 +37,7 @@ pub(super) fn planks() -> Picture {
     })
 }
 
-/// Five-petalled flower off the centre, beside a stripe, on a ground that darkens downwards.
+/// Five-petalled flower off the centre, beside a stripe, on a background that darkens downwards.
 pub(super) fn wallpaper() -> Picture {
     const SIDE: u32 = 256;
     Picture::new([SIDE, SIDE], |column, row| {
@@ -58,8 +59,7 @@ pub(super) fn wallpaper() -> Picture {
     })
 }
 
-/// Crossing slats with a leaf in every other gap. Alpha falls off smoothly across the edges, where it is a
-/// half.
+/// Crossing slats with a leaf in every other gap. Alpha falls smoothly from 1 to 0 across the edges.
 pub(super) fn lattice() -> Picture {
     const SIDE: u32 = 128;
     Picture::new([SIDE, SIDE], |column, row| {

@@ -8,7 +8,7 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// Creates a picture. `texel` returns the texel at a column and row.
+    /// Creates a picture. `texel` returns the RGBA texel at a column and row.
     pub(super) fn new([width, height]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]) -> Self {
         let texel = &texel;
         let texels = (0..height).flat_map(|row| (0..width).map(move |column| texel(column, row))).collect();

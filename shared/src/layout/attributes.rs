@@ -12,13 +12,13 @@ const COORDINATES: usize = 12;
 const COLOURS: usize = 36;
 const EMITTER: usize = 60;
 
-/// Position of the [`Attributes`] of a leaf's triangles: consecutive records, in the order of the triangles'
-/// slots.
+/// Position of the [`Attributes`] of a leaf's triangles. They are consecutive records, in the order of the
+/// triangles in the leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafAttributes {
     /// Index of the leaf's first [`Attributes`] record.
     pub first: u32,
-    /// True if each slot has two records, the second for a second set of texture coordinates.
+    /// True if each triangle has two records, the second for a second set of texture coordinates.
     pub two_sets: bool,
 }
 
@@ -37,8 +37,8 @@ impl LeafAttributes {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// Index of the [`Attributes`] record with texture coordinate set `set`, 0 or 1, of the triangle in slot
-    /// `slot`. The record of set 0 also holds the triangle's other attributes.
+    /// Returns the index of the [`Attributes`] record of triangle `slot` of the leaf that holds texture
+    /// coordinate set `set`, 0 or 1. The record of set 0 also holds the triangle's other attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };
@@ -95,7 +95,7 @@ impl Attributes {
         }
     }
 
-    /// Texture coordinates of one corner, without reading the rest of the record.
+    /// Reads the texture coordinates of one corner, 0 to 2, without the rest of the record.
     #[inline(always)]
     pub fn coordinate(bytes: &[u8; Self::BYTES], corner: usize) -> [f32; 2] {
         let at = COORDINATES + 8 * corner;
@@ -137,7 +137,7 @@ pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     u | v << 16
 }
 
-/// Decodes an octahedral code to a vector in its direction, of length 0.57 to 1.
+/// Decodes an octahedral code to a vector, of length 0.57 to 1, in the encoded direction.
 #[inline(always)]
 pub(super) fn decode_octahedral(code: u32) -> [f32; 3] {
     let [u, v] = [code & 0xffff, code >> 16].map(|a| a as f32 * (2.0 / STEPS) - 1.0);

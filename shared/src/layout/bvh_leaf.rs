@@ -1,14 +1,16 @@
-//! Leaves of the bounding volume hierarchy: neighbouring triangles in one line, which are tested together.
+//! Leaves of the bounding volume hierarchy: neighbouring triangles in one 128-byte line, tested together for
+//! ray intersection.
 //!
-//! A shared vertex is stored once, so that a line holds up to eight triangles of a mesh, or three triangles
-//! without common vertices.
+//! A vertex shared by several triangles is stored once. A line therefore holds up to eight triangles of a
+//! mesh, or three triangles without common vertices.
 
 use core::ops::Range;
 
 use super::{Rows, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Maximum number of triangles of a leaf. A triangle's index is `LEAF_TRIANGLES * leaf + slot`.
+/// Maximum number of triangles of a leaf. A triangle's index in the card image is `LEAF_TRIANGLES * leaf +
+/// slot`, where `slot` is its number in the leaf.
 pub const LEAF_TRIANGLES: usize = 8;
 /// Maximum number of vertices of a leaf.
 pub const LEAF_VERTICES: usize = 9;
@@ -31,7 +33,7 @@ pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 2);
 const CUT_OUT: u32 = 2 * MAX_MATERIALS;
 /// Flag in a leaf's material index: triangles with this material are flat glass.
 const FLAT_GLASS: u32 = MAX_MATERIALS;
-/// Returns the bits of `flag` in the last of a material index's three bytes.
+/// Returns the part of `flag` that lies in the last of the three bytes of a material index.
 const fn in_last_byte(flag: u32) -> u8 {
     (flag >> (8 * (MATERIAL_BYTES - 1))) as u8
 }
@@ -55,17 +57,17 @@ pub struct Triangle {
     pub vertices: [[f32; 3]; 3],
     /// Index of the material, below [`MAX_MATERIALS`].
     pub material: u32,
-    /// True if glTF's alpha mode `MASK` may cut out parts of the triangle, by the alpha of the base texture
-    /// or of the vertex colours.
+    /// True if parts of the triangle may be absent (glTF alpha mode `MASK`), where the alpha of the base
+    /// texture or of the vertex colours is low.
     pub cut_out: bool,
-    /// True if the triangle is flat glass: a perfectly smooth thin wall or pane, which light passes without a
-    /// change of direction.
+    /// True if the triangle is flat glass: a perfectly smooth thin wall or pane, through which light passes
+    /// without a change of direction.
     pub flat_glass: bool,
 }
 
 impl BvhLeaf<'_> {
-    /// Bytes of the line that are needed to read a triangle whose slot is known: all but the last byte, which
-    /// holds the numbers of triangles and vertices.
+    /// Range of the line's bytes that are needed to read one triangle: all but the last byte, which holds the
+    /// numbers of triangles and vertices.
     pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
 
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
@@ -94,7 +96,8 @@ impl BvhLeaf<'_> {
         [self.corners(0), self.corners(1), self.corners(2)]
     }
 
-    /// Vertex index of one corner of every triangle. The indices are below nine even in a damaged card image.
+    /// Vertex indices of corner `corner` of all triangles. The indices are below nine even in a damaged card
+    /// image.
     #[inline(always)]
     fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
@@ -132,7 +135,7 @@ impl BvhLeaf<'_> {
         read_f32(self.0, COORDINATE_BYTES * axis + 4 * vertex)
     }
 
-    /// Offset of the material index of triangle `slot` in the line, bytes.
+    /// Returns the offset in the line, bytes, of the material index of triangle `slot`.
     #[inline(always)]
     fn material_of(&self, slot: usize) -> usize {
         let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
@@ -151,7 +154,7 @@ impl BvhLeaf<'_> {
         self.last_byte(slot) & in_last_byte(FLAT_GLASS) != 0
     }
 
-    /// Last byte of a triangle's material index, which contains the flags.
+    /// Returns the last byte of a triangle's material index. This byte contains the flags.
     #[inline(always)]
     fn last_byte(&self, slot: usize) -> u8 {
         self.byte(self.material_of(slot) + MATERIAL_BYTES - 1)
@@ -247,8 +250,8 @@ impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
         Self { items: [None; MOST], count: 0 }
     }
 
-    /// Returns the index of `item`, which is added if the set lacks it. `None` if it would have to be added
-    /// and the set is full.
+    /// Returns the index of `item`, after adding it if the set does not contain it. `None` if the set is full
+    /// and does not contain it.
     fn index(&mut self, item: T) -> Option<usize> {
         let index = self.items().position(|other| other == item).unwrap_or(self.count);
         *self.items.get_mut(index)? = Some(item);

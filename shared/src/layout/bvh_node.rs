@@ -1,7 +1,7 @@
 //! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children in one line.
 //!
-//! The boxes are quantised to 8 bits per axis on a grid of the node, whose unit is a power of two on every
-//! axis (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide
+//! The boxes are quantised to 8 bits per axis on a grid of the node. The grid's unit on each axis is a power
+//! of two (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide
 //! BVHs*). A child's box exceeds its contents by at least [`MARGIN`] units, more than the ray caster's
 //! rounding error.
 
@@ -10,7 +10,7 @@ use super::{read_vector, write_f32};
 use crate::address::LINE_BYTES;
 
 /// An inner node of the bounding volume hierarchy, one line. It is a [`WideNode`] with the further fields
-/// below. The sides of the children's boxes are in the node's units, counted from the node's corner.
+/// below. The bounds of the children's boxes are in the node's units, relative to the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -20,10 +20,10 @@ use crate::address::LINE_BYTES;
 pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const UNITS: usize = 22;
-/// Minimum distance of a box's side from its contents, in the node's units.
+/// Minimum distance between a face of a stored box and the contents of the box, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
-/// Minimum of the units' biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a
-/// unit are exact.
+/// Minimum biased exponent of a unit, which is then 2^-95 m. It is far above the subnormal numbers, so that
+/// products with a unit are exact.
 const MIN_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 
@@ -36,7 +36,7 @@ pub struct NodeBox {
     pub upper: [f32; 3],
 }
 
-/// One axis of the children's boxes: child `i` extends from `corner + unit * lower[i]` to `corner + unit *
+/// Children's boxes on one axis: child `i` extends from `corner + unit * lower[i]` to `corner + unit *
 /// upper[i]`.
 #[derive(Clone, Copy)]
 pub struct BvhAxis<'a> {
@@ -44,9 +44,9 @@ pub struct BvhAxis<'a> {
     pub corner: f32,
     /// Unit of the node's 8-bit grid, metres: a power of two.
     pub unit: f32,
-    /// Lower side of each child's box; lanes past the last child are meaningless.
+    /// Lower bound of each child's box; elements past the last child are meaningless.
     pub lower: &'a [u8; NODE_CHILDREN],
-    /// Upper side of each child's box; lanes past the last child are meaningless.
+    /// Upper bound of each child's box; elements past the last child are meaningless.
     pub upper: &'a [u8; NODE_CHILDREN],
 }
 
@@ -92,7 +92,7 @@ impl<'a> BvhNode<'a> {
     }
 }
 
-/// Positions on one axis of a node's 8-bit grid: `corner + i unit`, where the unit has the biased exponent
+/// One axis of a node's 8-bit grid, with lines at `corner + i unit`. The unit has the biased exponent
 /// `exponent`.
 struct Grid {
     corner: f32,
@@ -100,8 +100,8 @@ struct Grid {
 }
 
 impl Grid {
-    /// Returns the finest grid that covers an interval, metres; `None` if an end is not finite or no grid
-    /// covers it.
+    /// Returns the finest grid that covers the interval from `lower` to `upper`, metres. `None` if an end is
+    /// not finite or no grid covers the interval.
     fn around(lower: f32, upper: f32) -> Option<Self> {
         if !lower.is_finite() || !upper.is_finite() {
             return None;
@@ -126,16 +126,16 @@ impl Grid {
         (f64::from(place) - f64::from(self.corner)) / self.unit()
     }
 
-    /// Returns the greatest grid line that is at least [`MARGIN`] units below a coordinate; `None` if there
-    /// is none.
+    /// Returns the greatest grid line that is at least [`MARGIN`] units below the coordinate `place`; `None`
+    /// if there is none.
     fn below(&self, place: f32) -> Option<u8> {
         let units = self.units(place) - MARGIN;
         // The conversion rounds down.
         (0.0..=255.0).contains(&units).then_some(units as u8)
     }
 
-    /// Returns the least grid line that is at least [`MARGIN`] units above a coordinate; `None` if there is
-    /// none.
+    /// Returns the least grid line that is at least [`MARGIN`] units above the coordinate `place`; `None` if
+    /// there is none.
     fn above(&self, place: f32) -> Option<u8> {
         let units = self.units(place) + MARGIN;
         let line = units as u64;
@@ -163,7 +163,7 @@ impl NodeBox {
 }
 
 impl BvhAxis<'_> {
-    /// Lower and upper side of the box of child `child`, metres.
+    /// Returns the lower and upper bound of the box of child `child`, metres.
     pub fn sides(&self, child: usize) -> Option<[f64; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| f64::from(self.corner) + f64::from(side) * f64::from(self.unit)))
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// Checks that a unit is at most twice the smallest possible, unless `f32` is too coarse for the corner.
+    /// Checks that a unit is at most twice the smallest possible, plus the spacing of `f32` at the corner.
     fn check_units(line: &[u8; LINE_BYTES], boxes: &[NodeBox]) {
         let around = boxes.iter().copied().reduce(NodeBox::union).expect("a child");
         for (axis, coded) in BvhNode(line).axes().iter().enumerate() {

@@ -2,11 +2,12 @@
 //! vectors*). The sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a
 //! square.
 //!
-//! The number of codes of a coordinate is odd, so that the six axes are exact.
+//! Each coordinate of the square has an odd number of codes. Zero, and with it the six axes, are therefore
+//! exact.
 
-/// Number of steps on either side of zero in a coordinate of a direction, which has 8 bits.
+/// Number of quantisation steps from 0 to 1 in a coordinate of a direction, stored in 8 bits.
 const DIRECTION_STEPS: f32 = 127.0;
-/// Number of steps on either side of zero in a coordinate of a normal, which has 4 bits.
+/// Number of quantisation steps from 0 to 1 in a coordinate of a normal, stored in 4 bits.
 const NORMAL_STEPS: f32 = 7.0;
 
 /// Encodes a unit vector as an octahedral code of two bytes. The error is at most 1 degree.
@@ -16,7 +17,7 @@ pub fn encode_direction(vector: [f32; 3]) -> [u8; 2] {
     [quantise(u, DIRECTION_STEPS), quantise(v, DIRECTION_STEPS)]
 }
 
-/// Decodes a two-byte octahedral code to a vector in its direction, with `|x| + |y| + |z| = 1`.
+/// Decodes a two-byte octahedral code to a vector with `|x| + |y| + |z| = 1`, not normalised.
 #[inline(always)]
 pub fn decode_direction(bytes: [u8; 2]) -> [f32; 3] {
     let [u, v] = bytes.map(|byte| (byte as f32 - DIRECTION_STEPS) / DIRECTION_STEPS);
@@ -31,15 +32,15 @@ pub fn encode_normal(vector: [f32; 3]) -> u8 {
     quantise(u, NORMAL_STEPS) << 4 | quantise(v, NORMAL_STEPS)
 }
 
-/// Decodes a one-byte octahedral code to a vector in the normal's direction, with `|x| + |y| + |z| = 1`.
+/// Decodes a one-byte octahedral code to a vector with `|x| + |y| + |z| = 1`, not normalised.
 #[inline(always)]
 pub const fn decode_normal(byte: u8) -> [f32; 3] {
     let [high, low] = [byte >> 4, byte & 15];
     fold((high as f32 - NORMAL_STEPS) / NORMAL_STEPS, (low as f32 - NORMAL_STEPS) / NORMAL_STEPS)
 }
 
-/// Class, 0 to 15, of a normal's octahedral code: the two upper bits of each coordinate, so that 4x4 adjacent
-/// codes share a class.
+/// Returns the class of directions, 0 to 15, of a normal's octahedral code: the upper two bits of each
+/// coordinate. 4x4 adjacent codes share a class.
 #[inline(always)]
 pub const fn normal_class(byte: u8) -> u32 {
     (byte as u32 >> 6) << 2 | (byte as u32 >> 2) & 3

@@ -9,8 +9,8 @@ pub struct DistantLight {
     pub direction: [f32; 3],
     /// Irradiance of a surface perpendicular to the light, W/m^2.
     pub irradiance: [f32; 3],
-    /// Sum of the probabilities of the distant lights up to and including this one, in units of 2^-32; 2^32 -
-    /// 1 for the last.
+    /// Cumulative probability of choosing this distant light or one before it, in units of 2^-32. The last
+    /// light has 2^32 - 1.
     pub threshold: u32,
 }
 

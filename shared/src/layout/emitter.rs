@@ -11,7 +11,7 @@ pub struct Emitter {
     /// point or spot light, the intensity, W/sr.
     pub emission: [f32; 3],
     /// Bit trail (PBRT 4): the path from the root of the light tree to the emitter. Each level takes two
-    /// bits, the index of the child; the root's are the lowest.
+    /// bits, the index of the child to follow. The lowest two bits belong to the root.
     pub trail: u32,
 }
 
@@ -28,8 +28,8 @@ pub enum EmitterKind {
         triangle: u32,
         /// Index of the triangle's material.
         material: u32,
-        /// True if the radiance varies over the triangle, because of an emissive texture, cut-outs (`MASK`)
-        /// or partial coverage (`BLEND`).
+        /// True if the radiance varies over the triangle. The cause is an emissive texture, cut-outs (glTF
+        /// alpha mode `MASK`) or partial coverage (`BLEND`).
         varies: bool,
     },
     /// An isotropic point light.

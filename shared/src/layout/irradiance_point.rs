@@ -11,9 +11,9 @@ use super::PHOTON_CONTENT_BYTES;
 /// | 48..56 | surface normal, [`super::encode_normal`], on the lit side |
 /// | 56..64 | shared exponent `e`: a component is `mantissa * 2^(e - 143)` |
 ///
-/// The largest component's mantissa is at least 2^15, so that the error of every component is at most 2^-16
-/// of the largest. The 8-bit mantissas of [`super::Rgbe`] are too coarse: their errors average out in a sum
-/// over a hundred photons, but not in a single point.
+/// The mantissa of the largest component is at least 2^15, so that the error of every component is at most
+/// 2^-16 of the largest component. The 8-bit mantissas of [`super::Rgbe`] are too coarse: their errors
+/// average out in a sum over many photons, but not in a single point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradiancePoint {
     /// Irradiance, photon power units/m^2.
@@ -60,7 +60,7 @@ impl IrradiancePoint {
         Self { irradiance: [component(0), component(1), component(2)], normal: Self::normal_of(bits) }
     }
 
-    /// Normal code of a point whose bytes are the little-endian `u64` `bits`.
+    /// Returns the normal code of a point, given its eight bytes as the little-endian number `bits`.
     #[inline(always)]
     pub fn normal_of(bits: u64) -> u8 {
         (bits >> NORMAL_SHIFT) as u8
@@ -70,7 +70,7 @@ impl IrradiancePoint {
 /// `value * 2^exponent`, at most `f32::MAX`, for exponents of -252 to 254.
 #[inline(always)]
 fn scaled(value: f32, exponent: i32) -> f32 {
-    // Multiplied in two factors, as 2^exponent may be out of the range of `f32` where the product is not.
+    // Two factors, because 2^exponent alone can be out of the range of `f32` when the product is not.
     let half = exponent / 2;
     let product = value * power_of_two(half) * power_of_two(exponent - half);
     if product < f32::MAX { product } else { f32::MAX }

@@ -1,5 +1,5 @@
-//! Kernels of caustic photons. The code of a kernel's area takes the five bits that hold the disc fraction of
-//! a photon of the photon map.
+//! Density estimation kernels of caustic photons. The area of a photon's kernel has a 5-bit code. The code
+//! takes the bits that hold the disc fraction in a photon of the photon map.
 
 use super::photon::DISC_CODES;
 
@@ -8,15 +8,15 @@ const LAST: u8 = DISC_CODES as u8 - 1;
 const EXPONENT_BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;
 
-/// Area of the kernel's disc as a fraction of the maximum area: `2^(code - 31)`. Only the lower five bits of
-/// `code` count.
+/// Returns the area of the kernel's disc, as a fraction of the maximum area: `2^(code - 31)`. Only the lower
+/// five bits of `code` are used.
 #[inline(always)]
 pub fn kernel_share(code: u8) -> f32 {
     f32::from_bits((EXPONENT_BIAS - u32::from(LAST - (code & LAST))) << MANTISSA_BITS)
 }
 
-/// Code of the smallest disc whose area is at least the fraction `share` of the maximum area. Fractions out
-/// of range take the first or the last code.
+/// Returns the code of the smallest disc whose area is at least `share` times the maximum area. Values of
+/// `share` out of range get the first or the last code.
 pub fn encode_kernel(share: f32) -> u8 {
     (0..LAST).find(|&code| kernel_share(code) >= share).unwrap_or(LAST)
 }

@@ -1,18 +1,19 @@
-//! Layers of materials beyond the base: textures of the dielectric's reflectance, normal map, clearcoat,
-//! sheen and transmission.
+//! Material properties beyond the base: normal maps, clearcoat, sheen, diffuse transmission, and textures of
+//! specular reflectance and transmission.
 
 use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// Layers of a material that has more than its base. Each texture, except normal maps, multiplies the glTF
-/// factor that it is named after.
+/// Parameters and textures of the material layers above the base (glTF extensions). Each texture, except a
+/// normal map, multiplies the glTF factor that it is named after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// F0 of the dielectric without `specularFactor`: `((ior - 1) / (ior + 1))^2` times
+    /// F0 of the dielectric before the factor `specularFactor`: `((ior - 1) / (ior + 1))^2` times
     /// `specularColorFactor`. It may exceed 1.
     pub specular: [f32; 3],
     /// Scale of x and y of the normal map (glTF `normalTexture.scale`).
     pub normal_scale: f32,
-    /// Factor of the coat's reflectance, 0 to 1 (`clearcoatFactor` of `KHR_materials_clearcoat`).
+    /// Factor that multiplies the coat's reflectance, 0 to 1 (`clearcoatFactor` of
+    /// `KHR_materials_clearcoat`).
     pub coat: f32,
     /// Roughness of the coat, 0 to 1.
     pub coat_roughness: f32,
@@ -22,16 +23,17 @@ pub struct Layers {
     pub sheen: [f32; 3],
     /// Roughness of the sheen, 0 to 1.
     pub sheen_roughness: f32,
-    /// Fraction of the diffuse light that leaves on the other side, 0 to 1
+    /// Fraction of the diffusely scattered light that is transmitted to the other side, 0 to 1
     /// (`KHR_materials_diffuse_transmission`).
     pub diffuse_transmission: f32,
-    /// Colour of the diffuse light that leaves on the other side, 0 to 1.
+    /// Colour of the diffuse transmission, 0 to 1.
     pub diffuse_transmission_colour: [f32; 3],
     /// Indices of the textures, in the order of [`LayerTexture::ALL`]; [`NO_TEXTURE`] if absent.
     pub textures: [u16; TEXTURE_COUNT],
 }
 
-/// A texture of [`Layers`].
+/// A texture of [`Layers`]. Each variant states the glTF factor that the texture multiplies, and the channels
+/// that it reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LayerTexture {
@@ -60,7 +62,7 @@ pub enum LayerTexture {
 }
 
 impl LayerTexture {
-    /// All textures, in the order of their indices in a record.
+    /// All textures, in the order of `Layers::textures`.
     pub const ALL: [Self; 11] = [
         Self::Normal,
         Self::Specular,

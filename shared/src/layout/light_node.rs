@@ -1,4 +1,4 @@
-//! Nodes of the light tree, one line each. A node bounds the emitters below each of up to four children.
+//! Nodes of the light tree, one line each. A node stores bounds and power of its up to four children.
 
 use super::attributes::{decode_octahedral, encode_octahedral};
 use super::{read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
@@ -28,10 +28,10 @@ pub struct LightChild {
     pub radius: f32,
     /// Power of the emitters below the child as a fraction of the node's power.
     pub share: f32,
-    /// Axis of the bounding cone of the emission normals, of length 0.57 to 1.
+    /// Axis of the cone that bounds the emission normals, a vector of length 0.57 to 1.
     pub axis: [f32; 3],
-    /// Cosine of the half angle of the bounding cone. It is -1, for all directions, if there are point lights
-    /// or double-sided triangles below the child.
+    /// Cosine of the half angle of this cone. It is -1 (all directions) if a point light or a double-sided
+    /// triangle is below the child.
     pub cosine: f32,
     /// Index of the child: a node or an emitter.
     pub link: LightLink,

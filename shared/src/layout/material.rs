@@ -10,13 +10,14 @@ pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
-/// Flag of [`Material::flags`]: the GGX lobe is narrow at some texel, and is followed by rays instead of
-/// being estimated from photons.
+/// Flag of [`Material::flags`]: the GGX lobe is narrow at some texel. Reflection by this lobe is sampled with
+/// rays, not estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
-/// Value of `a = roughness^2` below which a GGX lobe is narrow: half of the lobe's light is then within 28
-/// degrees, an eighth of the hemisphere. A material whose lobe is narrow at some texel has [`NARROW_LOBE`] at
-/// all texels, because photons are stored for the lobe everywhere on a surface or nowhere.
+/// Value of `a = roughness^2` below which a GGX lobe is narrow. At this value half of the lobe's light is
+/// within 28 degrees of the mirror direction, an eighth of the hemisphere. A material whose lobe is narrow at
+/// some texel has [`NARROW_LOBE`] at all texels, because photons are stored for the lobe everywhere on a
+/// surface or nowhere.
 pub const NARROW_ALPHA: f32 = 0.25;
 
 /// Flag of [`Material::flags`]: glTF's `alphaMode` is `BLEND`. Coverage, the fraction of the surface that is
@@ -29,14 +30,15 @@ pub const COMPENSATED: u32 = 128;
 
 /// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a face of a pane, a slab with parallel faces whose
 /// thickness is small beside its extents. The face where light enters has the reflectance and transmittance
-/// of the whole slab; the face where it leaves only passes it on.
+/// of the whole slab. The face where light leaves transmits it unchanged.
 pub const PANE: u32 = 256;
 
 const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED | PANE;
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
-/// Lowest bit, in the flags word, of the index of [`super::Layers`] plus 1.
+/// Position in the flags word of the lowest bit of the [`super::Layers`] index plus 1; 0 stands for no
+/// layers.
 const LAYERS_SHIFT: u32 = 9;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
@@ -71,7 +73,7 @@ pub struct Material {
 /// Model of reflection and transmission, with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflectance {
-    /// A Lambertian part and a Phong lobe.
+    /// A Lambertian component plus a Phong lobe.
     Phong {
         /// Lambertian albedo, to be multiplied by the base texture.
         diffuse: [f32; 3],
@@ -97,16 +99,16 @@ pub enum Reflectance {
     Glass {
         /// Transmission colour, to be multiplied by the base texture.
         base: [f32; 3],
-        /// Absorption coefficient inside, 1/m. For a [`PANE`] it is the optical depth, the coefficient times
-        /// the thickness.
+        /// Absorption coefficient inside the solid, 1/m. For a [`PANE`] it is the optical depth, the
+        /// coefficient times the thickness.
         absorption: [f32; 3],
-        /// Fraction, 0 to 1, of the light past the Fresnel reflection that is transmitted. A Lambertian base
-        /// of the base colour reflects the rest.
+        /// Fraction, 0 to 1, that is transmitted of the light left after Fresnel reflection. A Lambertian
+        /// base with the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.
         ior: f32,
-        /// Factor, 0 to 1 in steps of 1/255, of the dielectric's Fresnel reflectance (`specularFactor` of
-        /// `KHR_materials_specular`).
+        /// Factor that multiplies the dielectric's Fresnel reflectance, 0 to 1 in steps of 1/255
+        /// (`specularFactor` of `KHR_materials_specular`).
         specular: f32,
         /// Metalness, 0 to 1; metal transmits nothing.
         metallic: f32,

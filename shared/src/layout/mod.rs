@@ -1,4 +1,5 @@
-//! Formats of the records in card memory. Numbers are little-endian, and no record straddles a line.
+//! Formats of the records in card memory. Numbers are little-endian, and no record crosses the border of a
+//! line.
 //!
 //! | record | bytes | records in a line |
 //! |---|---|---|
@@ -75,9 +76,9 @@ pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};
 
 /// A record of fixed size in card memory.
 pub trait Record: Sized {
-    /// Bytes of the record.
+    /// Size of the record, bytes.
     const BYTES: usize;
-    /// Records in one line.
+    /// Number of whole records in one line.
     const PER_LINE: usize = LINE_BYTES / Self::BYTES;
 }
 
@@ -118,7 +119,7 @@ fn write_vector<const N: usize>(bytes: &mut [u8; N], offset: usize, value: [f32;
 
 #[cfg(test)]
 mod tests {
-    /// Pseudo-random numbers (xorshift64) of a seed.
+    /// Returns a generator of pseudo-random numbers (xorshift64).
     pub(super) fn random(seed: u64) -> impl FnMut() -> u64 {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         move || {

@@ -14,14 +14,14 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon adds up, divided
-/// by the area `pi r^2` of a flat disc of the gather's radius `r`. It is 1 on a flat wall, less at edges and
-/// in corners, more where surfaces are stacked. The density estimate divides by `pi r^2` times this fraction.
-/// Where walls hide parts of the disc from the photon ([`is_of_region`]), a gather counts only photons of the
-/// region that the gather's point sees, and divides by the area of that region in the plane times the
-/// fraction. The fraction is stored as a code of [`disc_fraction`].
+/// The *disc fraction* is `A / (pi r^2)`, where `A` is the area of the surfaces from which a gather of radius
+/// `r` around this photon takes photons. It is 1 on a flat wall, less at edges and in corners, more where
+/// surfaces are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls hide parts
+/// of the disc from the photon, the fraction is relative to the visible region instead ([`is_of_region`]). A
+/// gather then counts only photons of the region that the gather's point sees, and divides by the region's
+/// area times the fraction. The fraction is stored as a code of [`disc_fraction`].
 ///
-/// In the caustic map these five bits hold the radius of the photon's kernel, as a code of
+/// In the caustic map the five bits of the disc fraction hold the area of the photon's kernel, as a code of
 /// [`super::kernel_share`].
 ///
 /// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it.
@@ -34,7 +34,7 @@ pub struct Photon {
     pub position: [f32; 3],
     /// Power, photon power units.
     pub power: Rgbe,
-    /// Octahedral code of the incoming direction, from the surface towards the origin of the photon.
+    /// Octahedral code of the incoming direction, which points from the surface back along the photon's path.
     pub direction: [u8; 2],
     /// Splitting axis of the kd-tree node: 0, 1 or 2.
     pub axis: u8,
@@ -48,7 +48,7 @@ pub struct Photon {
 
 /// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// Code of the disc fraction 1 where no wall hides a part of the disc.
+/// Code of the disc fraction 1 of a photon from which no wall hides a part of the disc.
 pub const FULL_DISC: u8 = 13;
 /// First code of the disc fractions that are relative to a visible region, the unhidden part of the disc.
 const FIRST_REGION: u8 = 20;
@@ -59,7 +59,7 @@ const DISC_MASK: u8 = DISC_CODES as u8 - 1;
 const DISC_SHIFT: u32 = 10;
 /// Ratio of the disc fractions of consecutive codes from 0.4 to 1: `4^(1/9)`.
 const FINE_STEP: f64 = 1.166_529_039_576_120_8;
-/// Ratio of the disc fractions of consecutive codes above 1, and of the codes of a visible region: `4^(1/6)`.
+/// Ratio of the disc fractions of consecutive codes above 1, and of all codes of a visible region: `4^(1/6)`.
 const COARSE_STEP: f64 = 1.259_921_049_894_873_2;
 /// Ratio of the disc fractions of consecutive codes below 0.4.
 const SMALL_STEP: f64 = 1.4;
@@ -67,8 +67,9 @@ const SMALL_STEP: f64 = 1.4;
 const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Disc fractions of all codes: geometric series from 0.038 to 4 relative to the disc, and from 0.31 to 4
-/// relative to a visible region, so that the relative rounding error hardly varies.
+/// Returns the disc fractions of all codes: series from 0.038 to 4 relative to the disc, and from 0.31 to 4
+/// relative to a visible region. Both are piecewise geometric, so that the relative rounding error hardly
+/// varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
@@ -112,11 +113,11 @@ pub fn is_of_region(code: u8) -> bool {
     code & DISC_MASK >= FIRST_REGION
 }
 
-/// Code of a disc fraction, dithered. With `of_region` the fraction is relative to a visible region.
+/// Encodes a disc fraction, dithered. With `of_region` the fraction is relative to a visible region.
 ///
-/// `dither`, in [0, 1), chooses between the two neighbouring codes such that the mean of
-/// `1 / disc_fraction(code)`, the factor in a gather, is `1 / fraction`. Fractions out of range take the
-/// first or the last code.
+/// `dither`, in [0, 1), chooses between the two neighbouring codes such that the mean of `1 /
+/// disc_fraction(code)`, the factor in a gather, is `1 / fraction`. Fractions out of range get the first or
+/// the last code.
 #[inline]
 pub fn encode_disc(fraction: f32, of_region: bool, dither: f32) -> u8 {
     let (first, end) = if of_region { (FIRST_REGION, DISC_CODES as u8) } else { (0, FIRST_REGION) };
@@ -154,7 +155,7 @@ impl Photon {
         read_vector(bytes, 0)
     }
 
-    /// Reads the flags from a record without reading the rest.
+    /// Reads the flags (bytes 18..20) from a record without reading the rest.
     #[inline(always)]
     pub fn flags(bytes: &[u8; Self::BYTES]) -> u16 {
         u16::from_le_bytes([bytes[18], bytes[19]])
@@ -173,7 +174,7 @@ impl Photon {
         [a, b, c, d, e, f, g, h]
     }
 
-    /// Replaces the disc fraction's code in a photon's content.
+    /// Returns a photon's content in which the code of the disc fraction is replaced by `disc`.
     #[must_use]
     pub fn content_with_disc(content: [u8; PHOTON_CONTENT_BYTES], disc: u8) -> [u8; PHOTON_CONTENT_BYTES] {
         let [a, b, c, d, e, f, low, high] = content;
@@ -226,8 +227,8 @@ impl Rgbe {
 
     /// Encodes a colour, dithered. Negative and non-finite components are encoded as 0.
     ///
-    /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over
-    /// many encodings is the colour. Rounding to nearest would have the same bias for all photons of one
+    /// The random bits of `dither` choose whether each component is rounded up or down. The mean over many
+    /// encodings is therefore the colour. Rounding to nearest would have the same bias for all photons of one
     /// light.
     #[inline]
     pub fn encode(colour: [f32; 3], dither: u32) -> Self {

@@ -1,14 +1,15 @@
-//! Grid on which the positions of photons lie. Every layout of the photon map stores them exactly.
+//! Grid on which the positions of photons lie, so that every layout of the photon map stores them without
+//! rounding.
 
 /// Number of bits of a grid coordinate.
 pub const GRID_BITS: u32 = 20;
 pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
-/// Maximum magnitude of `origin + q`. Integers up to 2^24 are exact in `f32`.
+/// Maximum magnitude of `origin + q` in `PhotonGrid`, because integers up to 2^24 are exact in `f32`.
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
-/// Grid of the photons' positions: the position with the grid coordinates `q`, each below 2^20, is `(origin +
-/// q) * cell`, which is exact in `f32`. The longest side of the covered box takes at least half of the 2^20
-/// cells, or fewer far from the origin, where `f32` is coarser.
+/// Grid of the photons' positions. Grid coordinates `q`, each below 2^20, stand for the position `(origin +
+/// q) * cell`, which is exact in `f32`. The longest side of the covered box spans at least half of the 2^20
+/// cells. Far from the origin it spans fewer, because `f32` is coarser there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner of the grid, in cells.
@@ -21,7 +22,7 @@ impl PhotonGrid {
     /// Grid whose cells have a side of 1 m and begin at the origin.
     pub const UNIT: Self = Self { origin: [0; 3], cell: 1.0 };
 
-    /// Returns the finest grid that covers a box, metres.
+    /// Returns the finest grid that covers the box from `lower` to `upper`, metres.
     pub fn around(lower: [f32; 3], upper: [f32; 3]) -> Self {
         let mut least = f64::from(f32::MIN_POSITIVE);
         for (lower, upper) in lower.into_iter().zip(upper) {
@@ -82,7 +83,7 @@ fn floor(value: f64) -> i32 {
     if f64::from(towards_zero) > value { towards_zero - 1 } else { towards_zero }
 }
 
-/// Returns the smallest power of two that is at least `value`, clamped to the normal numbers of `f32`.
+/// Returns the smallest power of two that is at least `value`, clamped to the normal range of `f32`.
 pub fn power_of_two_above(value: f64) -> f32 {
     // Computed from the exponent bits, because the last digit of a logarithm differs between platforms.
     let bits = value.max(f64::MIN_POSITIVE).to_bits();

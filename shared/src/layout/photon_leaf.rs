@@ -1,8 +1,8 @@
-//! Leaves of the photon map: neighbouring photons in one line.
+//! Leaves of the photon map: neighbouring photons in one 128-byte line.
 //!
-//! A leaf is as exact as [`super::Photon`]. Positions lie on the [`super::PhotonGrid`] in either layout; a
-//! leaf stores them as 16-bit offsets from its corner. The offsets on one axis are contiguous, so that one
-//! vector instruction reads all of them.
+//! A leaf stores photons as exactly as [`super::Photon`] does: all positions lie on the
+//! [`super::PhotonGrid`]. A leaf stores each coordinate as a 16-bit offset from the leaf's corner. The
+//! offsets on one axis are contiguous, so that one vector instruction reads all of them.
 
 use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
@@ -17,8 +17,9 @@ use crate::address::LINE_BYTES;
 /// | 8.. | for each varying axis, the photons' offsets from the corner, two bytes each |
 /// | ..128 | contents of the photons, 8 bytes each, in reverse: the first photon's at the end of the line |
 ///
-/// A coordinate of the corner has 20 bits, or 17 on a varying axis, where it is a multiple of 8. At least one
-/// axis is marked as varying. Contents are the last 8 bytes of [`super::Photon`], without the splitting axis.
+/// An axis varies if the photons' coordinates on it differ; at least one axis is marked as varying. The
+/// corner's coordinate takes 20 bits. On a varying axis it is a multiple of 8, and its upper 17 bits are
+/// stored. A photon's content is the last 8 bytes of [`super::Photon`], without the splitting axis.
 #[derive(Clone, Copy)]
 pub struct PhotonLeaf<'a> {
     line: &'a [u8; LINE_BYTES],
@@ -32,7 +33,7 @@ struct LeafAxis {
     corner: u32,
     /// Offset in the line of the first photon's coordinate, bytes.
     first: u32,
-    /// Mask of the offsets: all bits, or 0 if the axis does not vary.
+    /// Mask that is applied to each offset: all ones, or 0 if the axis does not vary.
     mask: u16,
 }
 
@@ -45,23 +46,23 @@ pub struct LeafCoordinates<'a> {
     /// Offset of each photon from the corner, little-endian. Lanes past the last photon hold other bytes of
     /// the line.
     pub offsets: &'a [[u8; 2]; LEAF_LANES],
-    /// Mask of the offsets: all bits, or 0 if the axis does not vary.
+    /// Mask that is applied to each offset: all ones, or 0 if the axis does not vary.
     pub mask: u16,
 }
 
 /// Maximum number of photons of a leaf.
 pub const LEAF_PHOTONS: usize = 12;
-/// Number of lanes of [`LeafCoordinates`].
+/// Number of offsets in [`LeafCoordinates`], at least `LEAF_PHOTONS`.
 pub const LEAF_LANES: usize = 16;
 
 const HEADER_BYTES: usize = 8;
 const AXES_BITS: u32 = 3;
 const COUNT_BITS: u32 = 4;
-/// Number of low bits, all zero, of the corner's coordinate that are not stored on a varying axis.
+/// Number of low bits of the corner's coordinate on a varying axis. They are zero and not stored.
 const CORNER_ROUNDING: u32 = 3;
 const _: () = assert!(HEADER_BYTES + 2 * 2 * LEAF_PHOTONS + 2 * LEAF_LANES <= LINE_BYTES);
 
-/// Maximum number of photons of a leaf whose coordinates vary on `axes` axes.
+/// Returns the maximum number of photons in a leaf if their coordinates differ on `axes` axes.
 pub const fn leaf_capacity(axes: usize) -> usize {
     let axes = if axes < 1 { 1 } else { axes };
     (LINE_BYTES - HEADER_BYTES) / (PHOTON_CONTENT_BYTES + 2 * axes)
@@ -120,8 +121,8 @@ impl<'a> PhotonLeaf<'a> {
         [x.coordinate(index), y.coordinate(index), z.coordinate(index)]
     }
 
-    /// Power, direction and flags ("content") of each photon, in reverse order: the first photon's is the
-    /// last element. Elements before the last photon's hold other bytes of the line.
+    /// Returns the photons' contents (power, direction and flags) in reverse order: the last element is that
+    /// of photon 0. Elements before the content of the last photon hold other bytes of the line.
     #[inline(always)]
     pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
         const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];
@@ -134,8 +135,8 @@ impl<'a> PhotonLeaf<'a> {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Returns for each axis whether a leaf whose photons have this bounding box stores offsets on it. It
-    /// stores them on the axes where coordinates vary, or on x if none vary.
+    /// Returns for each axis whether a leaf stores offsets on it, if its photons have the bounding box
+    /// `bounds`. These are the axes on which coordinates differ, or x if there is none.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];
@@ -184,8 +185,8 @@ impl<'a> PhotonLeaf<'a> {
         Some(line)
     }
 
-    /// Replaces the disc fraction's code of photon `index` in the line of a leaf. Has no effect past the last
-    /// photon.
+    /// Sets the code of the disc fraction (see `Photon`) of photon `index` in a leaf's line. Does nothing if
+    /// the leaf has no such photon.
     pub fn set_disc(line: &mut [u8; LINE_BYTES], index: u32, disc: u8) {
         if index >= PhotonLeaf::read(line).photons() {
             return;

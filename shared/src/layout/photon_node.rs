@@ -1,37 +1,37 @@
 //! Inner nodes of the photon map: the boxes of sixteen children in one line.
 //!
 //! The boxes are quantised to 8 bits per axis on a grid of the node. Rounding is conservative: a child's box
-//! contains all its photons. The sides of all children's boxes on one axis are contiguous, so that one vector
-//! instruction reads them.
+//! contains all its photons. The bounds of all children's boxes on one axis are contiguous, so that one
+//! vector instruction reads them.
 
 use super::photon_grid::GRID_MASK;
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of a photon map, one line. It is a [`WideNode`] with the further fields below. The sides of
-/// the children's boxes are in the node's units, counted from the node's corner.
+/// An inner node of a photon map, one line. It is a [`WideNode`] with the further fields below. The bounds of
+/// the children's boxes are in the node's units, relative to the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
-/// | 22..24 | photon map: upper half of the bits of [`Self::photon_share`] |
-/// | 22..24 | caustic map: one bit per child, set if the normals of all photons below it are of one class |
-/// | 24..32 | caustic map: four bits per child, the normals' class ([`normal_class`](super::normal_class)) |
+/// | 22..24 | photon map: upper 16 bits of [`Self::photon_share`] |
+/// | 22..24 | caustic map: one bit per child, set if the normals of all its photons are of one class |
+/// | 24..32 | caustic map: four bits per child, this class of directions ([`normal_class`](super::normal_class)) |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// Offset in the line of the photon share, bytes.
+/// Offset of the photon share in a node, bytes.
 const SHARE: usize = 22;
-/// Offset in the line of a caustic map of the bits of children of one class, bytes.
+/// Offset, bytes, in a node of a caustic map: bit mask of the children whose normals are of one class.
 const OF_ONE_CLASS: usize = 22;
-/// Offset in the line of a caustic map of the children's classes, bytes.
+/// Offset, bytes, in a node of a caustic map: normal classes of the children.
 const CLASSES: usize = 24;
 /// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
 
-/// An axis-aligned box on the [`super::PhotonGrid`], bounds inclusive.
+/// An axis-aligned box on the [`super::PhotonGrid`]. Both corners belong to the box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridBox {
     /// Minimum corner, grid coordinates.
@@ -48,17 +48,16 @@ pub struct NodeCoordinates<'a> {
     pub corner: u32,
     /// Base-2 logarithm of the unit of `lower` and `upper`, in grid cells.
     pub exponent: u32,
-    /// Lower side of each child's box; lanes past the last child are meaningless.
+    /// Lower bound of each child's box; elements past the last child are meaningless.
     pub lower: &'a [u8; NODE_CHILDREN],
-    /// Upper side of each child's box; lanes past the last child are meaningless.
+    /// Upper bound of each child's box; elements past the last child are meaningless.
     pub upper: &'a [u8; NODE_CHILDREN],
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Returns `r^2 / k`, m^2, where `r` is the radius to which a search for the k nearest photons is
-    /// narrowed if this node is the first node with leaves that the search visits. The host chooses `r` such
-    /// that most of these searches find k photons. The value is 0 in a node without leaves, and where the
-    /// host has no estimate.
+    /// Returns `r^2 / k`, m^2. A search for the k nearest photons reduces its radius to `r` at the first node
+    /// with leaves that it visits. The host chooses `r` such that most of these searches find k photons. The
+    /// value is 0 in a node without leaves, and where the host has no estimate.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
@@ -71,8 +70,8 @@ impl<'a> PhotonNode<'a> {
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Bit mask of the children of a caustic map whose photons have normals of one class
-    /// ([`normal_class`](super::normal_class)) that is not in the bit mask `classes`.
+    /// Returns a bit mask of children of a node of a caustic map: those whose normals are all of one class
+    /// ([`normal_class`](super::normal_class)), if this class is not in the bit mask `classes`.
     #[inline(always)]
     pub fn children_without(&self, classes: u16) -> u16 {
         let node = WideNode(self.0);
@@ -86,9 +85,9 @@ impl<'a> PhotonNode<'a> {
         of_one & without
     }
 
-    /// Stores the classes ([`normal_class`](super::normal_class)) of the normals below each child of a node
-    /// of a caustic map. `children` has one bit mask of classes per child. A child of several classes is in
-    /// no result of [`Self::children_without`].
+    /// Stores, in a node of a caustic map, the classes ([`normal_class`](super::normal_class)) of each
+    /// child's normals. `children` yields one bit mask of classes per child. [`Self::children_without`] never
+    /// returns a child that has several classes.
     pub fn set_classes(line: &mut [u8; LINE_BYTES], children: impl IntoIterator<Item = u16>) {
         let (mut of_one, mut codes) = (0_u16, 0_u64);
         for (child, classes) in children.into_iter().enumerate().take(NODE_CHILDREN) {
@@ -173,7 +172,7 @@ impl GridBox {
 }
 
 impl NodeCoordinates<'_> {
-    /// Lower and upper side of the box of child `child`, grid coordinates.
+    /// Returns the lower and upper bound of the box of child `child`, grid coordinates.
     pub fn sides(&self, child: usize) -> Option<[u32; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| self.corner + (u32::from(side) << self.exponent)))

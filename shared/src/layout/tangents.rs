@@ -15,9 +15,10 @@ const SIGNS: usize = 12;
 /// | 12..16 | bit `i`, 0 to 2: set if the sign of corner `i` is -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangents {
-    /// Tangents, of length 0.57 to 1. A corner without a tangent has zero: a normal map has no effect there.
+    /// Tangents of the corners, of length 0.57 to 1. A zero vector stands for no tangent: a normal map has no
+    /// effect there.
     pub directions: [[f32; 3]; 3],
-    /// 1 or -1: the bitangent is the sign times `normal x tangent` (glTF's `TANGENT.w`).
+    /// Signs of the corners, 1 or -1 (glTF's `TANGENT.w`): the bitangent is `sign * (normal x tangent)`.
     pub signs: [f32; 3],
 }
 
@@ -34,8 +35,8 @@ impl Tangents {
     /// Tangents of a triangle that has none.
     pub const NONE: Self = Self { directions: [[0.0; 3]; 3], signs: [1.0; 3] };
 
-    /// Index of the record with the tangents of triangle `slot` of a leaf. Only leaves with a normal-mapped
-    /// material have these records.
+    /// Returns the index, among the [`Attributes`], of the record with the tangents of triangle `slot` of a
+    /// leaf. Only leaves with a normal-mapped material have these records.
     #[inline(always)]
     pub fn locate(leaf: LeafAttributes, slot: u32) -> u32 {
         leaf.first.wrapping_sub(Self::RECORDS as u32).wrapping_add(Self::record(slot))
@@ -76,7 +77,8 @@ impl Tangents {
         write_u32(bytes, at + SIGNS, signs);
     }
 
-    /// Number of the record that holds triangle `slot`, 0 to [`Self::RECORDS`] - 1.
+    /// Returns the number, 0 to [`Self::RECORDS`] - 1, of the record that holds the tangents of triangle
+    /// `slot`.
     #[inline(always)]
     fn record(slot: u32) -> u32 {
         slot / Self::PER_RECORD as u32

@@ -11,8 +11,8 @@ pub const TILE_WIDTH: u32 = 8;
 /// Number of rows of a texel tile, the part of a texture in one line.
 pub const TILE_HEIGHT: u32 = TEXELS_PER_LINE / TILE_WIDTH;
 
-/// A texture. Its texel tiles of 8x4 texels are in row-major order, one a line; tiles at the right and lower
-/// border are padded to full size.
+/// A texture. Each line holds a tile of 8x4 texels; the tiles are in row-major order. Tiles at the right and
+/// lower border are padded to full size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
     /// First line of the texels, counted from the start of [`crate::image::SectionKind::Texels`].
@@ -54,11 +54,11 @@ pub enum TexelFormat {
     Linear,
     /// OpenGL's `RGB9_E5`: red, green and blue with 9 bits each and a shared exponent of 5 bits. Alpha is 1.
     SharedExponent,
-    /// Two linear channels of 16 bits, little-endian. The first is red and blue, the second green. Alpha is
-    /// 1.
+    /// Two linear channels of 16 bits each, little-endian. The first gives red and blue, the second green.
+    /// Alpha is 1.
     LinearPair,
-    /// Normal map with red and green linear, 16 bits each, little-endian. Blue is computed so that the normal
-    /// `2 channel - 1` has unit length and points to the front. Alpha is 1.
+    /// Texel of a normal map: red and green, linear, 16 bits each, little-endian. Blue is computed such that
+    /// the normal `2 (red, green, blue) - 1` has unit length and points to the front. Alpha is 1.
     NormalPair,
 }
 

@@ -1,5 +1,6 @@
-//! Common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node with up to sixteen children.
-//! Among its children, leaves come before inner nodes, and the indices of each kind are consecutive.
+//! Common format of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node with up to sixteen children.
+//! Children that are leaves come before children that are inner nodes. The indices of each kind are
+//! consecutive.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
@@ -10,7 +11,8 @@ const FIRST_LEAF: usize = 12;
 const FIRST_NODE: usize = 16;
 const LEAVES: usize = 20;
 const CHILDREN: usize = 21;
-/// Offset of the children's boxes in the line, bytes: sixteen bytes each of lower x, y, z, upper x, y, z.
+/// Offset of the children's boxes in the line, bytes. The boxes are six arrays of sixteen bytes: lower x, y,
+/// z, upper x, y, z.
 const SIDES: usize = 32;
 const _: () = assert!(SIDES + 6 * NODE_CHILDREN == LINE_BYTES);
 
@@ -23,7 +25,7 @@ pub enum Child {
     Node(u32),
 }
 
-/// Common part of inner nodes: indices and boxes of the children.
+/// Common part of all inner nodes: indices and boxes of the children.
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -31,7 +33,7 @@ pub enum Child {
 /// | 16..20 | index of the first child that is a node |
 /// | 20 | number of children that are leaves |
 /// | 21 | number of children |
-/// | 32..128 | sides of the children's boxes, sixteen bytes each: lower x, y, z, upper x, y, z |
+/// | 32..128 | bounds of the children's boxes, sixteen bytes each: lower x, y, z, upper x, y, z |
 #[derive(Clone, Copy)]
 pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
 
@@ -63,7 +65,8 @@ impl<'a> WideNode<'a> {
         }
     }
 
-    /// Lower and upper sides of all children's boxes on one axis, in units of the node's 8-bit grid.
+    /// Returns the lower and upper bounds of all children's boxes on one axis, in units of the node's 8-bit
+    /// grid.
     #[inline(always)]
     pub(super) fn sides(&self, axis: usize) -> [&'a [u8; NODE_CHILDREN]; 2] {
         const NONE: &[u8; NODE_CHILDREN] = &[0; NODE_CHILDREN];
@@ -81,7 +84,7 @@ impl<'a> WideNode<'a> {
 }
 
 impl Links {
-    /// Kind and index of child number `index`.
+    /// Returns the kind and the index of child number `index` of the node.
     #[inline(always)]
     pub fn child(&self, index: u32) -> Child {
         // The sum wraps in unsound card images only.
@@ -93,8 +96,8 @@ impl Links {
     }
 }
 
-/// Writes the indices of the children into the line of a node; `None` if there are no children, too many, or
-/// fewer than `links` has leaves.
+/// Writes the indices of the children into the line of a node. Returns `None` if there are no children, more
+/// than [`NODE_CHILDREN`], or fewer than `links.leaves`.
 pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: Links) -> Option<()> {
     if children == 0 || children > NODE_CHILDREN || links.leaves as usize > children {
         return None;
@@ -106,7 +109,8 @@ pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: L
     Some(())
 }
 
-/// Writes the sides of a child's box on one axis, in units of the node's 8-bit grid; `None` out of range.
+/// Writes the lower and upper bound of a child's box on one axis, in units of the node's 8-bit grid. Returns
+/// `None` if a byte would lie outside the line.
 pub(super) fn write_sides(
     line: &mut [u8; LINE_BYTES],
     axis: usize,

@@ -1,4 +1,4 @@
-//! Faults: reasons why a card could not execute a command, as numbers on the wire and as texts for people.
+//! Faults: reasons why a card could not execute a command, as numbers on the link and as error messages.
 
 use core::fmt;
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Fault {
     /// Kind of fault.
     pub code: FaultCode,
-    /// Number that locates the fault, such as a line or a record; [`FaultCode`] defines its meaning.
+    /// Further information, such as the number of a line or record; [`FaultCode`] defines its meaning.
     pub detail: u32,
 }
 
@@ -25,15 +25,14 @@ pub enum FaultCode {
     /// The data of a write is not whole lines, exceeds the card image, or has too many lines; detail: number
     /// of the first line.
     Lines,
-    /// Checksums were requested of no chunks, of too many, or of chunks that were not written; detail: number
-    /// of the first chunk.
+    /// The requested chunks are none, too many or not written; detail: number of the first chunk.
     Chunks,
     /// The card image's checksum is not the announced one; detail: the lower half of the checksum found.
     ImageChecksum,
     /// The card image's header is invalid; detail: the card image's layout version if that is wrong, else 0.
     ImageHeader,
-    /// A frame parameter is outside the budget, is not a number, or needs something that the card image does
-    /// not have; detail: number of the [`Parameter`].
+    /// A frame parameter is outside the budget, is not a number, or needs a section that the card image
+    /// lacks; detail: number of the [`Parameter`].
     Parameter,
     /// A tile is empty, outside the picture or larger than the budget allows; detail: the tile's number.
     Tile,
@@ -54,13 +53,13 @@ pub enum FaultCode {
 }
 
 /// Conditions that hold in a correct chip, numbered as in the detail of [`FaultCode::Internal`]. If a
-/// condition is violated, the card sends a fault instead of losing light.
+/// condition is violated, the card sends a fault instead of a wrong picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Invariant {
-    /// A pass, a completion or a gather must belong to a tile in flight.
+    /// Every step of work (pass over pixels, completion of a pixel, gather) must belong to a tile in flight.
     Flight,
-    /// A tile in flight that begins a block must have a block left.
+    /// A tile in flight that begins its next block (part of a tile) must have a block left.
     Block,
     /// A block whose irradiance records exceed the cache must have several pixels, so that it can be halved.
     Halves,
@@ -68,22 +67,23 @@ pub enum Invariant {
     Pixels,
     /// The buffer of sums must have room for each pixel with gather rays.
     Sums,
-    /// The buffer of gather points must have room for each point of a pass, and each point must have rays.
+    /// The buffer of gather points must have room for each point of a pass over pixels, and each point must
+    /// have rays.
     Points,
     /// An irradiance record must be in the state that a step of its survey or gather expects.
     Record,
-    /// A gather that ends must be one of those that its tile in flight counts as waiting.
+    /// When a gather ends, its tile in flight must count at least one waiting gather.
     Waiting,
     /// An eye path that ended at a surface must end at a surface when it is traced again.
     Surface,
-    /// A bundle, rays that are cast together, must have room for each of its rays.
+    /// A bundle (rays that are cast together) must have room for each ray that is added.
     Bundle,
     /// A reply must have room for each pixel, checksum or result that is added to it.
     Reply,
 }
 
 impl Invariant {
-    /// Fault that reports a violation of this invariant.
+    /// Returns the fault that reports a violation of this invariant.
     pub const fn fault(self) -> Fault {
         Fault { code: FaultCode::Internal, detail: self as u32 }
     }
@@ -170,12 +170,12 @@ impl Parameter {
         Self::AdaptiveThreshold,
     ];
 
-    /// Fault that reports that the card cannot render with this parameter's value.
+    /// Returns the fault that reports that the card cannot render with the parameter's value.
     pub const fn fault(self) -> Fault {
         Fault { code: FaultCode::Parameter, detail: self as u32 }
     }
 
-    /// Name of the parameter in texts for people.
+    /// Name of the parameter in error messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Width => "width",

@@ -47,7 +47,7 @@ pub const LINES_PER_WRITE: usize = 8;
 /// Number of lines of a chunk. [`Reply::Checksums`] has one checksum per chunk.
 pub const CHUNK_LINES: u32 = 64;
 
-/// On-chip memory that a firmware uses, measured by its board.
+/// On-chip memory that a card's firmware uses, measured by the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryUse {
     /// Static data, initialised and zeroed, bytes.
@@ -75,7 +75,8 @@ pub struct Camera {
     pub up: [f32; 3],
 }
 
-/// Parameters of a frame: order of work, and everything but the card image that the pixels depend on.
+/// Parameters of a frame. With the card image, they determine the pixels. Some of them only set the order of
+/// work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameParameters {
     /// Width of the whole picture, pixels.
@@ -86,20 +87,20 @@ pub struct FrameParameters {
     pub camera: Camera,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Number of the first sample of each pixel. The number is above 0 if other frames of the picture have
-    /// the earlier samples.
+    /// Number of the first sample of each pixel. It is above 0 if other frames of the picture render the
+    /// earlier samples.
     pub first_sample: u32,
     /// Number of samples per pixel in this frame.
     pub samples: u32,
-    /// Planned number of samples per pixel in all frames of the picture. With the irradiance cache, a pixel's
-    /// gather rays are divided among these samples.
+    /// Planned number of samples per pixel in all frames of the picture together. With the irradiance cache,
+    /// a pixel's gather rays are divided among these samples.
     pub planned_samples: u32,
-    /// Number of final gather rays of a sample; with the irradiance cache, of an irradiance record, and of
-    /// all planned samples of a pixel together.
+    /// Number of final gather rays per sample. With the irradiance cache, it is the number per irradiance
+    /// record, and the number per pixel for all planned samples together.
     pub gather_rays: u32,
     /// Shadow rays per sample.
     pub shadow_rays: u32,
-    /// Number k of photons of a gather, at least 2. The k-th photon only determines the radius.
+    /// Number k of photons of a gather, at least 2. The k-th photon determines the radius and adds no light.
     pub neighbors: u32,
     /// Maximum radius of a gather, metres.
     pub max_distance: f32,
@@ -118,8 +119,8 @@ pub struct FrameParameters {
     pub queue: u32,
     /// Source of the reflected radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Parameters of gathers in the caustic map. With `None`, a gather ray that reaches an emitter through
-    /// specular surfaces counts the emitter's emission.
+    /// Parameters of gathers in the caustic map; `None` if the map is not used. A gather ray that reaches an
+    /// emitter through specular surfaces then counts the emitter's emission.
     pub caustics: Option<CausticGather>,
     /// True if the card sends [`LayerSums`] with each pixel. The radiance of a pixel is the same with and
     /// without layers. With layers, a tile has fewer pixels ([`Budget::pixels_of_tile`]).
@@ -128,12 +129,13 @@ pub struct FrameParameters {
     pub filter: Filter,
     /// Maximum number of tiles in flight, at least 1. A chip limits it to [`Budget::in_flight`].
     pub in_flight: u32,
-    /// True if the picture has several frames. Irradiance records of a tile are then kept in the lines after
-    /// the card image, as far as there is room, and reused by frames with other samples.
+    /// True if irradiance records are kept for later frames of the picture, which have other samples. They
+    /// are kept in the lines after the card image, as far as there is room.
     pub keep_records: bool,
     /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m), finite and above 0; `None` for one path per
-    /// sample. A sample after the first [`PROBES`] is the mean of `s / (threshold sqrt(L))` paths, rounded, 1
-    /// to [`MAX_PATHS`]; `L` and `s` are the mean and the standard deviation of the probes' light.
+    /// sample. The first [`PROBES`] samples are probes, whose light has the mean `L` and the standard
+    /// deviation `s`. Each later sample is the mean of `s / (threshold sqrt(L))` paths, rounded, 1 to
+    /// [`MAX_PATHS`].
     pub adaptive_threshold: Option<f32>,
 }
 
@@ -149,9 +151,9 @@ impl FrameParameters {
     }
 }
 
-/// Pixel filter: the density of a pixel's samples around its centre, on either axis. Samples are drawn from
-/// the filter and have equal weights (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that
-/// a pixel needs no samples of its neighbours.
+/// Pixel filter: the probability density of a pixel's samples on each axis. Samples are drawn from the filter
+/// and have equal weights (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that a pixel
+/// needs no samples of its neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Filter {
     /// A box filter, 1 pixel wide.
@@ -169,13 +171,13 @@ pub struct CausticGather {
     /// Number of neighbours from which the host has chosen the photons' kernel radii, at least 2. A card only
     /// checks it against [`Budget::neighbors`].
     pub neighbors: u32,
-    /// Maximum kernel radius of a photon, metres: that of the last code of
-    /// [`kernel_share`](crate::layout::kernel_share).
+    /// Maximum kernel radius of a photon, metres. The last code of
+    /// [`kernel_share`](crate::layout::kernel_share) stands for it.
     pub max_distance: f32,
 }
 
-/// Importance sampling of final gather rays. It does not change the expectation of the picture. Gather points
-/// with fewer than eight rays use [`Self::Reflection`].
+/// Importance sampling of final gather rays. It does not change the expectation of the picture. A gather
+/// point with fewer than eight rays always uses [`Self::Reflection`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
     /// Directions are chosen in proportion to the BRDF times the cosine.
@@ -193,7 +195,7 @@ pub enum Sampling {
 /// Source of the reflected radiance at the end of a gather ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Radiance {
-    /// Density estimate from the nearest photons.
+    /// Density estimate from the nearest photons, for all surfaces.
     #[default]
     Density,
     /// Irradiance of the nearest irradiance point (Christensen 1999, *Faster photon map global illumination*)
@@ -208,11 +210,11 @@ pub enum Drain {
     /// A gather is done at the end of its ray, without a queue.
     #[default]
     Immediate,
-    /// Gathers are queued, and done in the order of a spatial hash when the queue is full or no other work is
-    /// left.
+    /// Gathers are queued. When the queue is full or no other work is left, they are done in the order of a
+    /// spatial hash.
     Hash,
-    /// Gathers are queued, and done in the order of a Hilbert curve when the queue is full or no other work
-    /// is left.
+    /// Gathers are queued. When the queue is full or no other work is left, they are done in the order of a
+    /// Hilbert curve.
     Sort,
 }
 
@@ -241,8 +243,8 @@ impl Tile {
 /// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Begins a session, at any time. The card forgets its frame, its tiles and whether it has a card image,
-    /// but keeps the written lines. The encoding is equal in all versions of the protocol.
+    /// Begins a session, at any time. The card drops its frame, its tiles and its card image, but keeps the
+    /// written lines of memory. The encoding is equal in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -256,8 +258,8 @@ pub enum Command<'a> {
         /// Number of chunks.
         count: u32,
     },
-    /// Announces a card image. Lines written earlier are kept, so that only lines that differ from the
-    /// previous card image need be written.
+    /// Announces a card image. Lines of memory written earlier are kept. The host therefore writes only the
+    /// lines that differ.
     BeginImage {
         /// Number of lines of the card image.
         lines: u32,
@@ -281,12 +283,11 @@ pub enum Command<'a> {
     RenderTile(Tile),
     /// Computes the fixed operations of a self-test on operands.
     Compute {
-        /// Up to [`CASES_PER_COMMAND`] triples of `f32`, [`OPERAND_BYTES`] each.
+        /// Up to [`CASES_PER_COMMAND`] triples of `f32` operands, [`OPERAND_BYTES`] bytes per triple.
         #[serde(borrow)]
         operands: &'a [u8],
     },
-    /// Tests the whole memory. The card forgets everything that [`Command::Hello`] makes it forget, and all
-    /// written lines.
+    /// Tests the whole memory. The card drops all that [`Command::Hello`] drops, and all written lines.
     TestMemory,
     /// Announces that no tile follows for now: waiting gathers are done once no other work is left. The next
     /// [`Command::RenderTile`] revokes the announcement.
@@ -305,8 +306,7 @@ pub enum Reply<'a> {
         layout: u16,
         /// Capacities of the chip.
         budget: Budget,
-        /// Number of lines, from the first line of card memory, that were written since the card was switched
-        /// on.
+        /// Number of lines at the start of card memory that were written since the card was switched on.
         written_lines: u32,
         /// On-chip memory that the firmware uses. `None` on cards that do not measure it, such as emulated
         /// ones.
@@ -327,8 +327,8 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Answer to [`Command::BeginFrame`]: the card can render the frame.
     FrameAccepted,
-    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. Every pixel of a tile is sent
-    /// once. Several such replies make up a tile, in any order.
+    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. A tile takes several replies,
+    /// in any order. Every pixel is sent once.
     Pixels {
         /// Number of the tile.
         tile: u32,
@@ -349,7 +349,7 @@ pub enum Reply<'a> {
     Fault(Fault),
     /// Answer to [`Command::Compute`].
     Computed {
-        /// Results of each triple of operands, [`RESULT_BYTES`] each.
+        /// Results of the triples of operands, [`RESULT_BYTES`] bytes per triple.
         #[serde(borrow)]
         results: &'a [u8],
     },
@@ -357,12 +357,12 @@ pub enum Reply<'a> {
     MemoryTested(MemoryTest),
 }
 
-/// Writes a message into `bytes` and returns its length; `None` if there is no room.
+/// Encodes a message into `bytes` and returns its length; `None` if there is no room.
 pub fn encode<T: Serialize>(message: &T, bytes: &mut [u8]) -> Option<usize> {
     postcard::to_slice(message, bytes).ok().map(|written| written.len())
 }
 
-/// Reads a message that fills `bytes` exactly; `None` for any other bytes.
+/// Decodes a message; `None` if `bytes` is not exactly one encoded message.
 pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(message, _)| message)
 }

@@ -1,7 +1,7 @@
-//! Pixels: sums over samples, as chips send them, and the mean values that they represent.
+//! Pixels: the sums over samples that chips send, and the mean values that follow from them.
 //!
-//! Sums are integers. If a pixel is rendered several times with different samples, the sums of these renders
-//! add up exactly to the sums of all samples.
+//! Sums are integers. The sums of different samples of a pixel, from several renders, therefore add up
+//! exactly.
 
 /// Fixed-point scale of sums of light: one radiance unit is stored as 2^40.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
@@ -14,8 +14,8 @@ pub const DEPTH_STEPS: u32 = 1 << 16;
 /// Number of probes: a pixel's first samples in a frame with adaptive sampling. Their variance determines the
 /// number of paths of each later sample.
 pub const PROBES: u32 = 4;
-/// Weight of a probe's light relative to a later sample. It is fixed, so that the choice of the number of
-/// paths adds no bias.
+/// Weight of a probe's light in the pixel's mean; a later sample has weight 1. A weight that depended on the
+/// number of paths would add bias.
 pub const WEIGHT_OF_PROBE: f32 = 0.5;
 
 /// Numbers of samples and of probes in the sums of a pixel.
@@ -28,14 +28,14 @@ pub struct SampleCount {
 }
 
 impl SampleCount {
-    /// Counts `samples` samples from number `first` on, with or without adaptive sampling.
+    /// Counts the probes among `samples` samples from number `first` on. There are none unless `is_adaptive`.
     pub fn of_range(first: u32, samples: u32, is_adaptive: bool) -> Self {
         let probes = PROBES.saturating_sub(first).min(samples);
         Self { samples, probes: if is_adaptive { probes } else { 0 } }
     }
 
-    /// Sum of the weights of all samples' light: [`WEIGHT_OF_PROBE`] for a probe, 1 for another sample; at
-    /// least 1/2.
+    /// Returns the sum of the weights of the samples' light, at least 1/2. A probe has the weight
+    /// [`WEIGHT_OF_PROBE`], another sample 1.
     pub fn weight_of_light(self) -> f64 {
         (f64::from(self.samples) - f64::from(1.0 - WEIGHT_OF_PROBE) * f64::from(self.probes)).max(0.5)
     }
@@ -46,11 +46,11 @@ impl SampleCount {
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
     pub radiance: [f32; 3],
-    /// Mean over all samples of the albedo that a sample shows, 0 to 1 per channel. A sample without a
-    /// surface counts as 0.
+    /// Mean albedo of the surfaces that the samples see, 0 to 1 per channel. A sample that sees no surface
+    /// counts as 0.
     pub albedo: [f32; 3],
-    /// Mean over all samples of the unit normal that a sample shows, in world space, on the side of the eye.
-    /// A sample without a surface counts as 0.
+    /// Mean unit normal of the surfaces that the samples see, in world space, towards the eye. A sample that
+    /// sees no surface counts as 0.
     pub normal: [f32; 3],
     /// Mean depth, metres along the view axis, over the samples that see a surface; infinite if none does.
     pub depth: f32,
@@ -59,8 +59,8 @@ pub struct Pixel {
 /// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelLayers {
-    /// Direct light, W/(sr m^2): visible emission, and light of emitters found by shadow rays and by the
-    /// pixel's own gather rays.
+    /// Direct light, W/(sr m^2): visible emission, and light of emitters that shadow rays and the pixel's own
+    /// gather rays reach.
     pub direct: [f32; 3],
     /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated
     /// irradiance. Interpolated irradiance includes emission that gather rays of irradiance records hit.
@@ -71,7 +71,7 @@ pub struct PixelLayers {
     pub gathers: f32,
 }
 
-/// Units of a pixel's sums, which the card image states
+/// Units of a pixel's sums, stored in the card image
 /// ([`Header::sum_scale`](crate::image::Header::sum_scale)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumScale {
@@ -84,8 +84,8 @@ pub struct SumScale {
 /// Sums of a pixel over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelSums {
-    /// Sum of radiance, in steps of 2^-40 radiance units, at least 0; it saturates. With layers it is the sum
-    /// of the three components.
+    /// Sum of radiance, in steps of 2^-40 radiance units, at least 0, saturating. With layers it is the sum
+    /// of direct, indirect and caustic light.
     pub light: [i64; 3],
     /// Sum of albedos, in steps of 1 / [`ALBEDO_STEPS`].
     pub albedo: [u32; 3],
@@ -95,8 +95,7 @@ pub struct PixelSums {
     pub depth: i64,
     /// Number of samples that see a surface.
     pub surfaces: u32,
-    /// Sums of direct, indirect and caustic light apart; `None` if the rendered frame does not ask for such
-    /// layers.
+    /// Separate sums of direct, indirect and caustic light; `None` in a frame without layers.
     pub layers: Option<LayerSums>,
 }
 
@@ -114,7 +113,7 @@ pub struct LayerSums {
     pub gathers: u32,
 }
 
-/// Bytes of a pixel's albedo, normal, depth and number of surfaces.
+/// Bytes of a pixel's sums except light: albedo, normal, depth and number of surfaces.
 const VIEW_BYTES: usize = 12 + 12 + 8 + 4;
 /// Bytes of a sum of light.
 const LIGHT_BYTES: usize = 24;
@@ -145,12 +144,11 @@ impl Numbers<'_> {
     }
 }
 
-/// Applies `add` to each pair of components of two vectors.
+/// Adds two vectors, component by component, with the addition `add`.
 fn added<T>([a, b, c]: [T; 3], [p, q, r]: [T; 3], add: fn(T, T) -> T) -> [T; 3] {
     [add(a, p), add(b, q), add(c, r)]
 }
 
-/// Sum of two sums of light, saturating.
 fn added_light(light: [i64; 3], more: [i64; 3]) -> [i64; 3] {
     added(light, more, i64::saturating_add)
 }
@@ -218,7 +216,7 @@ impl PixelSums {
         }
     }
 
-    /// Sums over the samples of both operands. Layers are dropped unless both have them.
+    /// Returns the sums over the samples of both operands. Layers are dropped unless both operands have them.
     #[must_use]
     pub fn plus(&self, more: &Self) -> Self {
         let view = Self {
@@ -239,7 +237,7 @@ impl PixelSums {
         }
     }
 
-    /// Sums, without layers, for which [`Self::pixel`] returns the values nearest to `pixel`.
+    /// Returns the sums, without layers, for which [`Self::pixel`] returns the values nearest to `pixel`.
     pub fn nearest(pixel: &Pixel, count: SampleCount, scale: &SumScale) -> Self {
         let Pixel { radiance, albedo, normal, depth } = *pixel;
         let sees = depth.is_finite();
@@ -265,7 +263,7 @@ impl PixelSums {
         self.with_layers(LayerSums { direct, indirect, caustic, gathers: layers.gathers as u32 })
     }
 
-    /// Values of the pixel, averaged over the samples.
+    /// Returns the pixel's values, averaged over the samples.
     #[inline]
     pub fn pixel(&self, count: SampleCount, scale: &SumScale) -> Pixel {
         let per_sample = 1.0 / f64::from(count.samples.max(1));
@@ -280,7 +278,7 @@ impl PixelSums {
         }
     }
 
-    /// Values of the layers, averaged over the samples; `None` in a frame without layers.
+    /// Returns the values of the layers, averaged over the samples; `None` in a frame without layers.
     pub fn pixel_layers(&self, count: SampleCount, scale: &SumScale) -> Option<PixelLayers> {
         let LayerSums { direct, indirect, caustic, gathers } = self.layers?;
         let [direct, indirect, caustic] = [direct, indirect, caustic].map(|sum| radiance(sum, count, scale));
@@ -288,7 +286,7 @@ impl PixelSums {
     }
 }
 
-/// Sum of light whose mean is nearest to `radiance`.
+/// Converts a mean radiance to the nearest sum of light.
 fn light_of(radiance: [f32; 3], count: SampleCount, scale: &SumScale) -> [i64; 3] {
     let steps = LIGHT_STEPS / f64::from(scale.radiance) * count.weight_of_light();
     radiance.map(|value| rounded(f64::from(value) * steps).max(0))
@@ -299,7 +297,7 @@ fn rounded(value: f64) -> i64 {
     (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i64
 }
 
-/// Mean radiance of a sum of light.
+/// Converts a sum of light to the mean radiance.
 fn radiance(light: [i64; 3], count: SampleCount, scale: &SumScale) -> [f32; 3] {
     let unit = f64::from(scale.radiance) / LIGHT_STEPS;
     light.map(|sum| (sum as f64 * unit / count.weight_of_light()) as f32)

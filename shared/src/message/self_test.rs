@@ -8,7 +8,8 @@ use crate::address::LINE_BYTES;
 pub const WORDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
 /// Pattern of a memory test. It defines the content of every 32-bit word as a function of the word's index.
-/// Each pattern is written over the whole memory and then read back, so that a data cache cannot hide errors.
+/// Each pattern is written to the whole memory before it is read back, so that a data cache cannot hide
+/// errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MemoryPattern {
     /// One bit is set, at a different position in each word of a line. Finds data lines that are stuck at 0
@@ -22,8 +23,8 @@ pub enum MemoryPattern {
     Address,
     /// The complement of the word's index: the pattern [`Self::Address`] with every bit inverted.
     Complement,
-    /// The complement of the word's index, one byte of which is then written by a store of that byte alone.
-    /// Finds defects of byte lanes.
+    /// The complement of the word's index, in which one byte is then replaced by a one-byte store. Finds
+    /// defects of byte lanes.
     ByteLanes,
 }
 
@@ -52,7 +53,7 @@ impl MemoryPattern {
 /// A word whose value differs from the written one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WrongWord {
-    /// Index of the word, from the start of card memory.
+    /// Index of the 32-bit word, counted from the start of card memory.
     pub index: u32,
     /// The written value.
     pub expected: u32,
@@ -78,9 +79,9 @@ pub struct MemoryTest {
     pub lines: u32,
     /// Pattern that is being written or checked.
     pub pattern: MemoryPattern,
-    /// Number of lines that hold the pattern.
+    /// Number of lines to which the pattern was written so far.
     pub written: u32,
-    /// Number of lines that were read back.
+    /// Number of lines that were read back so far.
     pub checked: u32,
     /// Wrong words in the lines read back.
     pub wrong: WrongWords,
@@ -98,7 +99,7 @@ impl MemoryTest {
     }
 }
 
-/// Bytes of one case of [`super::Command::Compute`]: three operands, `f32`, little-endian.
+/// Bytes of one operand triple of [`super::Command::Compute`]: three little-endian `f32`.
 pub const OPERAND_BYTES: usize = 12;
 
 /// Maximum number of operand triples of one [`super::Command::Compute`].

@@ -1,22 +1,22 @@
 //! The transport: delivers messages once, whole and in order, over a link that damages, loses or repeats
 //! bytes.
 //!
-//! Each end of a link has a [`Transport`]. It does no I/O and has no clock: it consumes bytes and produces
-//! bytes.
+//! Each end of a link has a [`Transport`]. It does no I/O and has no clock: the caller passes received bytes
+//! to it and sends the bytes that it returns.
 //!
 //! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a random session number of
 //!   32 bits; the card then forgets any other session. A card answers a frame of an unknown session with
 //!   [`FrameKind::Unknown`], from which the host concludes that the card was reset.
 //! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are in flight: sent and not
 //!   acknowledged.
-//! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and
-//!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message that has
-//!   not arrived is lost if a message that was sent after it has arrived. Only lost messages are repeated.
-//! - Only a clock reveals that the last messages were lost. The host has one: after some silence it sends a
+//! - Every frame acknowledges messages of the other direction. `acknowledged` is the number of messages
+//!   taken; `held` marks which of the following messages have arrived. A link keeps the order of its bytes: a
+//!   message is lost if it has not arrived but a message sent after it has. Only lost messages are repeated.
+//! - The loss of the last messages is detected after some silence. The host, which has a clock, then sends a
 //!   [`FrameKind::Probe`] with the number of this transmission. The card's [`FrameKind::Answer`] returns that
 //!   number: host messages sent before the probe that have not arrived are lost. The answer also carries the
-//!   number of messages that the card has sent; those that have not arrived are lost, and the host's next
-//!   probe says so.
+//!   number of messages that the card has sent. If some have not arrived, they are lost, and the host's next
+//!   probe reports it.
 
 mod session;
 
@@ -52,7 +52,7 @@ impl Transport {
         Self::new(End::Card)
     }
 
-    /// Begins a session with the next message sent. Unacknowledged messages of an earlier session are
+    /// Begins session `number` with the next message sent. Unacknowledged messages of an earlier session are
     /// dropped.
     pub fn open(&mut self, number: u32) {
         self.session.begin(number);
@@ -68,8 +68,8 @@ impl Transport {
         self.session.on_their_way() == 0
     }
 
-    /// Number of messages delivered, modulo 2^16: messages taken at this end plus messages acknowledged by
-    /// the other end. It changes whenever a message is delivered in either direction.
+    /// Returns the number of messages delivered in both directions, modulo 2^16: messages taken at this end
+    /// plus messages acknowledged by the other end.
     pub fn passed(&self) -> u16 {
         self.session.passed()
     }
@@ -116,8 +116,8 @@ impl Transport {
         self.session.take()
     }
 
-    /// Acknowledges the messages taken since the last frame was sent. Must be called before this end waits,
-    /// or works for a long time.
+    /// Requests a frame that acknowledges the messages taken since the last frame was sent. Must be called
+    /// before this end waits, or works for a long time.
     pub fn acknowledge(&mut self) {
         if self.session.has_unacknowledged() {
             self.session.ask_for(Control::Acknowledge);
@@ -134,7 +134,7 @@ impl Transport {
         self.session.lose(|_, _| true);
     }
 
-    /// Numbers of damaged and repeated frames and of probes so far.
+    /// Returns the numbers of damaged and repeated frames and of probes so far.
     pub fn statistics(&self) -> LineStatistics {
         self.session.statistics()
     }

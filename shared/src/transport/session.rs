@@ -11,20 +11,20 @@ pub const WINDOW: usize = 4;
 /// `Transport::acknowledge`.
 const MAX_UNACKNOWLEDGED: u16 = WINDOW as u16 / 2;
 
-/// Statistics of damage and repetition on a link, as one end observes them.
+/// Numbers of damaged and repeated frames on a link, as counted by one end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineStatistics {
     /// Damaged frames received.
     pub damaged: u64,
     /// Messages sent again.
     pub repeated: u64,
-    /// Messages received again.
+    /// Messages received more than once.
     pub duplicates: u64,
     /// Probes sent.
     pub probes: u64,
 }
 
-/// Event that a received frame causes.
+/// Event that a received frame causes, for the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The frame is complete and belongs to this session.
@@ -51,13 +51,13 @@ struct Outgoing {
     passage: Passage,
 }
 
-/// Slot for a message that was received and is not taken. `payload` is meaningless unless `has_come`.
+/// Slot for a received message that is not yet taken. `payload` is meaningless unless `has_come`.
 struct Incoming {
     payload: Vec<u8, MAX_PAYLOAD>,
     has_come: bool,
 }
 
-/// Kind of frame without a message, to be sent next.
+/// Frame without a message that is to be sent next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
     Acknowledge,
@@ -88,10 +88,10 @@ pub(super) struct LinkSession {
     next: u16,
     /// Number of transmissions so far: frames with messages, and probes.
     transmissions: u16,
-    /// Number of messages that the other end had sent when it sent its last answer, if some of them are
-    /// missing. The missing ones are lost, and the next probe says so.
+    /// Number of messages that the other end had sent before its last answer, if some of them have not
+    /// arrived here. These are lost, and the next probe reports it.
     lost_below: Option<u16>,
-    /// Payload of the other end's last probe, which the answer returns.
+    /// Payload of the other end's last probe. The answer returns it.
     asked: [u8; 2],
     /// Received messages that are not taken, indexed by their number modulo [`WINDOW`].
     incoming: [Incoming; WINDOW],
@@ -173,7 +173,7 @@ impl LinkSession {
         true
     }
 
-    /// Returns whether messages were taken that are not yet acknowledged.
+    /// Returns true if a message was taken that is not yet acknowledged.
     pub(super) fn has_unacknowledged(&self) -> bool {
         self.unacknowledged > 0
     }
@@ -200,7 +200,7 @@ impl LinkSession {
         }
     }
 
-    /// Marks sent messages for repetition if `is_lost` is true of their number and transmission.
+    /// Marks for repetition the sent messages for which `is_lost(number, transmission)` is true.
     pub(super) fn lose(&mut self, is_lost: impl Fn(u16, u16) -> bool) {
         self.each_on_its_way(|number, message| {
             if let Passage::Sent { transmission } = message.passage
@@ -211,8 +211,8 @@ impl LinkSession {
         });
     }
 
-    /// Writes the next frame: the reply to an unknown session, else a message, else an acknowledgement, an
-    /// answer or a probe.
+    /// Writes the next frame, if there is one: the reply to an unknown session, else a message, else an
+    /// acknowledgement, an answer or a probe.
     pub(super) fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
         if let Some(Control::Unknown(number)) = self.control {
             self.control = None;
@@ -331,9 +331,9 @@ impl LinkSession {
         }
     }
 
-    /// Marks as lost, after an answer to a probe, the messages sent before the probe that have not arrived at
-    /// the other end. Requests a probe that reports as lost the other end's messages sent before the answer
-    /// that have not arrived here.
+    /// Processes the answer to the probe of transmission `probe`. Messages sent before the probe that have
+    /// not arrived are marked as lost. If one of the first `sent` messages of the other end has not arrived
+    /// here, a probe is requested that reports the loss.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);

@@ -71,7 +71,7 @@ impl fmt::Display for LineFaults {
     }
 }
 
-/// Port wrapper that injects faults in both directions.
+/// Injector of faults into the bytes that are read from and written to a port.
 pub struct FaultInjector {
     faults: LineFaults,
     incoming: Direction,
@@ -80,13 +80,11 @@ pub struct FaultInjector {
     held: Instant,
 }
 
-/// One direction of the line.
 struct Direction {
     /// Key of the direction's pseudo-random numbers.
     key: u32,
     /// Number of bytes that have entered the line, modulo 2^32.
     position: u32,
-    /// Bytes in the line.
     bytes: VecDeque<Passing>,
 }
 

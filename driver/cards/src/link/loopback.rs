@@ -1,5 +1,5 @@
 //! Link within the process: two bounded queues of bytes. The queues fill up more readily than those of
-//! hardware, which tests flow control.
+//! hardware, so that flow control is tested.
 //!
 //! A card writes a frame of some hundred bytes at a time, and a wake-up per frame would take longer than the
 //! host's work on it. A [patient](LoopbackPort::patient) port therefore wakes its reader once for many
@@ -12,11 +12,10 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::link::{Port, PortError};
 
-/// Time for which a patient port may leave a write unreported: its first call after that time wakes the
-/// reader.
+/// Time for which a patient port may leave its reader asleep after a write. The first call to the port after
+/// this time wakes the reader.
 const PATIENCE: Duration = Duration::from_micros(500);
 
-/// One direction of the link.
 #[derive(Default)]
 struct Direction {
     queue: Mutex<ByteQueue>,
@@ -79,8 +78,8 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 
 impl LoopbackPort {
     /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, the oldest unreported write is
-    /// 500 µs old, or this port waits for bytes itself. Only calls of the port wake the reader, so its owner
-    /// must keep calling it while it has work, and before it waits.
+    /// 500 µs old, or this port waits for bytes itself. Only calls to this port wake the reader, so the
+    /// port's owner must keep calling it while it has work, and before it waits.
     #[must_use]
     pub fn patient(mut self, wakes_at: usize) -> Self {
         self.wakes_at = wakes_at.min(self.capacity);

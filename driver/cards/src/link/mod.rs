@@ -1,4 +1,4 @@
-//! Links to cards: ports of bytes.
+//! Links to cards: ports that read and write bytes.
 //!
 //! A card in this process is reached by [`loopback()`], others by serial ports ([`open_serial`], listed by
 //! [`list_serial_ports`]) and sockets ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the card's end:

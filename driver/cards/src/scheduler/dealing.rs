@@ -67,7 +67,7 @@ impl Scheduler {
         self.waiting.remove(next)
     }
 
-    /// Finds a tile that another card has rendered and this one can verify.
+    /// Finds a tile that another card has rendered and `card` can verify.
     fn next_compared(&mut self, card: CardNumber) -> Option<usize> {
         while self.compared.front().is_some_and(|&index| !self.entries[index].is_open()) {
             self.compared.pop_front();
@@ -80,7 +80,8 @@ impl Scheduler {
         self.compared.iter().take(tiles).copied().find(|&index| self.is_for(card, index))
     }
 
-    /// Returns whether tile `index` is open, on no card, and without an answer of this card.
+    /// Returns whether tile `index` is neither accepted nor abandoned, is on no card, and has no answer of
+    /// this card.
     pub(super) fn is_for(&self, card: CardNumber, index: usize) -> bool {
         let entry = &self.entries[index];
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
@@ -146,8 +147,8 @@ impl Scheduler {
     }
 }
 
-/// Number of a working card's reserved tiles that other cards leave to it, because they would have to gather
-/// the irradiance records again.
+/// Number of reserved tiles that idle cards leave to a card at work. An idle card would have to gather the
+/// tiles' irradiance records again.
 const MAX_AT_HOME: usize = 4;
 
 impl Scheduler {

@@ -115,7 +115,8 @@ impl Entry {
         self.is_open() && self.answers.len() > 1
     }
 
-    /// Removes the answers and returns the verdict, if two answers agree or exactly one of two is dazzling.
+    /// Accepts one of the answers and removes all, if two answers agree or exactly one of two is dazzling.
+    /// Otherwise returns `None`.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
         let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
         let answers = std::mem::take(&mut self.answers);
@@ -141,7 +142,8 @@ impl Entry {
     }
 }
 
-/// Verdict on a verified tile: the accepted tile, the reason, and the sources of other answers.
+/// Decision on a tile with several answers: the accepted tile, the reason, and the sources of the answers
+/// that differ from it.
 pub(super) struct Judgement {
     pub(super) tile: FinishedTile,
     pub(super) agreed: Agreement,

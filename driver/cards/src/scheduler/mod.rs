@@ -1,22 +1,22 @@
 //! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next tile, unless so few tiles are left that
-//! other cards would have none. No card waits for another, and results arrive in any order. The pixels of a
-//! tile depend neither on its card nor on time.
+//! Tiles wait in one queue. A card with a free credit, which permits one more unanswered tile command, takes
+//! the next tile, unless so few tiles are left that other cards would have none. No card waits for another,
+//! and results arrive in any order. The pixels of a tile depend neither on its card nor on time.
 //!
 //! - A second card renders a tile that requires verification, as soon as a card is free. If the two answers
 //!   differ, a third card decides. All tiles of the outvoted card that no other card has confirmed are
 //!   rendered again.
 //! - A dazzling tile is verified as well, if there is another card. A tile is dazzling if its radiance is so
 //!   high that only a lamp next to a surface could explain it. If exactly one of two answers is dazzling, the
-//!   other one is accepted. The dazzling tiles of a single card are accepted and counted.
-//! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the
-//!   cards with the fewest crashes at it, and is abandoned after five crashes.
+//!   other one is accepted. If there is only one card, its dazzling tiles are accepted and counted.
+//! - A tile at which cards have crashed (were reset or lost) twice is set apart until all others are done. It
+//!   then goes to the cards with the fewest crashes at it, and is abandoned after five crashes.
 //! - In a render by passes, a tile is reserved for the card that rendered it before and holds its irradiance
 //!   records. Idle cards take reserved tiles of other cards from the end, unless those cards will soon render
 //!   them.
 //! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once
-//!   that exceeds twice the mean time of a tile. The first answer counts.
+//!   this time exceeds twice the mean time of a tile. The first answer counts.
 //!
 //! The scheduler has no thread, lock or clock: [`crate::dispatcher`] connects it to sessions and sinks.
 
@@ -57,7 +57,7 @@ const SLOWER_THAN_BEFORE: f64 = 50.0;
 /// emulates.
 const SLOWER_THAN_OTHERS: f64 = 1000.0;
 
-/// Tiles of a picture, with their progress.
+/// Tiles of a picture with their progress, and the cards to which they are assigned.
 #[derive(Debug)]
 pub struct Scheduler {
     entries: Vec<Entry>,
@@ -84,7 +84,7 @@ pub struct Scheduler {
 /// Numbers of tiles that were taken over, verified, repeated or revoked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileCounts {
-    /// Tiles taken over from an earlier render, without those that are verified.
+    /// Tiles taken over from an earlier render, without those that require verification.
     pub kept: usize,
     /// Dazzling tiles among those taken over.
     pub kept_dazzling: usize,
@@ -92,7 +92,7 @@ pub struct TileCounts {
     pub verified: usize,
     /// Tiles rendered once more, for verification or by an idle card.
     pub repeated: usize,
-    /// Tiles revoked because their card was outvoted.
+    /// Tiles revoked because their card was outvoted or sent wrong messages.
     pub revoked: usize,
 }
 
@@ -146,8 +146,8 @@ impl Scheduler {
         self
     }
 
-    /// Takes over the tiles of a film from an earlier render. Tiles that require verification are compared
-    /// with the answer of one card.
+    /// Takes over the finished tiles of an earlier render from its film. A tile that requires verification is
+    /// compared with the answer of one card.
     #[must_use]
     pub fn with_kept(mut self, film: &Film) -> Self {
         for (index, entry) in self.entries.iter_mut().enumerate() {
@@ -290,7 +290,8 @@ impl Scheduler {
         }
     }
 
-    /// Makes dazzling tiles that await confirmation available to the last card, because no other is left.
+    /// Makes the dazzling tiles that await confirmation available to the last card, if no other card is left
+    /// to confirm them.
     fn release_doubted(&mut self) {
         if self.living().nth(1).is_some() {
             return;
@@ -321,8 +322,9 @@ impl Scheduler {
         self.cards[card].lie
     }
 
-    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Returns its tiles that no
-    /// other card has confirmed, which the sinks must revoke. None of them may be in transit to the sinks.
+    /// Excludes a card that sent wrong messages, or wrong pixels of tile `about`. Returns the card's tiles
+    /// that no other card has confirmed, which the sinks must revoke. None of these may be in transit to the
+    /// sinks.
     pub(crate) fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
         self.set_standing(card, Standing::GivenUp);
         self.cards[card].lie = about;

@@ -11,11 +11,13 @@ pub enum GatherOrder {
     Naive,
     /// Pixels along the scanlines of square tiles, each with its rays in the sampler's order.
     Tiled,
-    /// Within a tile, all pixels' rays in one direction bin, then those in the next bin.
+    /// Within a tile, the rays of all pixels in one direction bin (range of directions), then those in the
+    /// next.
     DirectionBins,
-    /// Rays by direction bins. Gathers wait in the queue, sorted by a spatial hash of their positions.
+    /// Rays by direction bins. Gathers wait in the chip's queue, and are done in the order of a spatial hash
+    /// of their positions.
     Hash,
-    /// Rays by direction bins. Gathers wait in the queue, sorted along a Hilbert curve.
+    /// Rays by direction bins. Gathers wait in the chip's queue, and are done in order along a Hilbert curve.
     #[default]
     Sort,
 }
@@ -49,7 +51,8 @@ impl GatherOrder {
     }
 }
 
-/// Divides a window into tiles of at most `side * side` pixels, numbered from 0.
+/// Divides a window into tiles of at most `side * side` pixels, numbered from 0: rows of pixels in the naive
+/// order, otherwise squares.
 pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {
@@ -71,9 +74,9 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// Sorts tiles, numbered from 0, so that any first `k` of them are spread over the picture and take a typical
-/// time. The key is the fractional part of `number / golden ratio`. The gaps between the first `k` of `n`
-/// numbers have at most three lengths, all about `n / k` (three-gap theorem).
+/// Sorts tiles, numbered from 0, so that any first `k` of them are spread over the picture, and their render
+/// times are typical of it. The key is the fractional part of `number / golden ratio`. The gaps between the
+/// first `k` of `n` numbers have at most three lengths, all about `n / k` (three-gap theorem).
 pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
     /// `2^32` divided by the golden ratio.
     const GOLDEN: u32 = 0x9E37_79B9;

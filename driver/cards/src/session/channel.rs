@@ -44,7 +44,6 @@ impl Channel {
         }
     }
 
-    /// Drops the waiting commands.
     pub(super) fn drop_commands(&mut self) {
         self.commands.clear();
     }
@@ -72,12 +71,12 @@ impl Channel {
     }
 }
 
-/// Bytes that passed a link, and repairs on it.
+/// Counts of the bytes that passed a link, of damaged and repeated frames, of probes and of resets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkBytes {
-    /// Bytes of card image lines sent.
+    /// Bytes of the lines of the card image that were sent.
     pub image: u64,
-    /// Bytes of card image lines sent and of pixels received.
+    /// Bytes of the lines of the card image that were sent, and of the pixels that were received.
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,

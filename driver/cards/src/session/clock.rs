@@ -1,5 +1,5 @@
-//! Limits of a session: the times of silence and without progress after which it fails, the times of probes,
-//! and the number of a card's failures.
+//! Limits of a session: how long a card may be silent or make no progress, when it is probed, and how often
+//! it may fail.
 
 use std::time::Duration;
 
@@ -7,23 +7,23 @@ use super::SessionError;
 
 /// Maximum silence of a card that owes an answer. Cards answer between any two steps of their work.
 const SILENCE: Duration = Duration::from_secs(10);
-/// Silence before the first probe. The time doubles with each unanswered probe.
+/// Silence before the first probe. The time doubles with each unanswered probe, up to `MAX_PATIENCE`.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
-/// Maximum time from a card's first answer to its hello. A slow serial line takes a second or two.
+/// Maximum time from the first frame of a card to its hello. A slow serial line takes a second or two.
 const GREETING: Duration = Duration::from_secs(5);
-/// Minimum time limit of a tile if times of rendered tiles are known.
+/// Lower bound of a tile's time limit that is derived from the times of rendered tiles.
 const TILE: Duration = Duration::from_secs(30);
 /// Maximum time without progress while no tile is rendered. The longest step is the check of a received
 /// image, which takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
-/// Time per ray or gather that is added to [`STANDSTILL`] while a tile is rendered and no times are known,
-/// because all pixels may arrive at the end of a tile. It is some fifty times that of the slowest chip
-/// measured.
+/// Time per ray that is added to [`STANDSTILL`] while a tile is rendered and no times of tiles are known,
+/// because all pixels may arrive at the end of a tile. It is some fifty times that of the slowest measured
+/// chip.
 const RAY: Duration = Duration::from_millis(20);
 
-/// Maximum counted time between two polls of the link. A longer gap means that the host was suspended or had
-/// no processor time.
+/// Maximum time between two polls of the link that counts as silence of the card. A longer gap means that the
+/// host was suspended or had no processor time.
 const MAX_BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
 /// Times of events on a session's link.
@@ -129,8 +129,7 @@ fn time(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
-/// Maximum number of failures without a completed tile. A card that crashed at a tile receives that tile
-/// again.
+/// Maximum number of failures without a completed tile.
 const MAX_FAILURES: u32 = 4;
 
 #[derive(Default)]
@@ -151,7 +150,7 @@ impl Failures {
         if self.failed > MAX_FAILURES { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
     }
 
-    /// Forgets the written lines after a known reset, so that the next hello does not count it again.
+    /// Forgets the written lines after a known reset, so that the next hello does not count the reset again.
     pub(super) fn forget_lines(&mut self) {
         self.written_lines = 0;
     }

@@ -28,7 +28,7 @@ pub enum SessionError {
         /// Layout version of the card images that this program writes.
         host: u16,
     },
-    /// Error of a card whose budget has room for no tile command.
+    /// Error of a card whose budget (capacities) permits no tile command.
     #[error("the card says that it has room for no tile command at all")]
     #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
     NoTiles,
@@ -141,7 +141,8 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Checks that a card's budget equals its first one, against which settings, image and tiles were checked.
+/// Checks that a card accepts tile commands, and that its budget is that of its first hello, against which
+/// settings, image and tiles were checked.
 pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
     if budget.tiles == 0 {
         return Err(SessionError::NoTiles);

@@ -42,7 +42,7 @@ pub enum Restart {
 pub enum Event {
     /// The card has received card image and frame.
     Ready,
-    /// The card has rendered a tile with valid values.
+    /// The card has rendered a tile, and all pixel values are in the ranges that a chip can produce.
     TileDone(FinishedTile),
     /// The card was reset or lost before it completed the tile.
     TileLost {
@@ -67,9 +67,9 @@ pub(super) enum State {
     Comparing,
     /// Lines of the card image are being sent.
     Loading,
-    /// All lines are sent.
+    /// All lines are sent, and the card checks the image.
     Accepting,
-    /// Parameters of the frame are sent.
+    /// Parameters of the frame are sent, and the card is to accept them.
     Framing,
     /// The card has image and frame, and accepts tiles.
     Rendering,

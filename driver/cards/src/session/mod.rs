@@ -38,7 +38,8 @@ use self::self_test::Request;
 use self::tiles::TilesInFlight;
 use self::upload::{Comparison, Load};
 
-/// Maximum number of tiles on a card, whatever its budget. More would be delayed if the card were lost.
+/// Maximum number of unanswered tiles of a card, whatever its budget. If the card is lost, all of them are
+/// delayed.
 const MAX_CREDITS: u32 = 16;
 
 /// Session with one card.
@@ -61,11 +62,11 @@ pub struct Session {
     channel: Channel,
     clock: Clock,
     failures: Failures,
-    /// True if the card was working on a suspect tile when it was last greeted.
+    /// True if, when the card was last lost, it was working on a tile at which cards had crashed before.
     left_suspect: bool,
     /// True after [`Command::Flush`], until the next tile.
     is_flushed: bool,
-    /// Number of bytes received since the session's last frame.
+    /// Number of bytes received since the session's last valid frame.
     unheard_bytes: u64,
 }
 
@@ -97,7 +98,7 @@ impl Session {
         session
     }
 
-    /// Budget of the card; `None` before its hello.
+    /// Capacities of the card, as its hello states them; `None` before the hello.
     pub fn budget(&self) -> Option<&Budget> {
         self.budget.as_ref()
     }
@@ -112,8 +113,8 @@ impl Session {
         self.memory_use
     }
 
-    /// Declares that the card's memory holds the card image with this checksum. The next load sends none of
-    /// its lines, and the card checks the image like a received one.
+    /// Declares that the card's memory holds the card image with this checksum. The next load omits the lines
+    /// that the card holds already, and the card checks the image like a received one.
     pub fn assume(&mut self, checksum: u64) {
         self.assumed = Some(checksum);
     }

@@ -52,7 +52,7 @@ impl PixelLimits {
         &self.format
     }
 
-    /// First invalid value of a pixel.
+    /// Returns the first invalid value of a pixel; `None` if all are valid.
     pub(super) fn find_bad(&self, sums: &PixelSums) -> Option<BadValue> {
         let PixelSums { light, albedo, normal, depth, surfaces, layers } = *sums;
         let seen = f64::from(surfaces);
@@ -86,8 +86,8 @@ impl PixelLimits {
     }
 }
 
-/// Upper bound of depths, metres: distance from the eye to the farthest corner of the cube of coordinates up
-/// to `header.reach`, times the length of the view vector if that exceeds 1.
+/// Upper bound of depths, metres: distance from the eye to the farthest corner of `[-reach, reach]^3`, times
+/// the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
     let ways = frame.camera.origin.map(|eye| f64::from(eye.abs()) + f64::from(header.reach));

@@ -83,7 +83,7 @@ impl Session {
         }
     }
 
-    /// Processes the card's hello.
+    /// Accepts the card's hello if its budget is valid. Counts a failure if the hello reveals a reset.
     fn greet(&mut self, budget: Budget, written_lines: u32) -> Result<(), SessionError> {
         check_budget(&budget, self.budget.as_ref())?;
         if self.failures.says_hello(written_lines) && !self.left_suspect {

@@ -35,7 +35,7 @@ impl Request {
     }
 }
 
-/// Returns whether a report of a memory test is consistent, and possible after the last one.
+/// Returns whether a report of a memory test is consistent, and possible after the last report.
 fn follows(progress: &MemoryTest, last: Option<&MemoryTest>) -> bool {
     let MemoryTest { lines, pattern, written, checked, wrong } = *progress;
     let WrongWords { count, bits, first } = wrong;

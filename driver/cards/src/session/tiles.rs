@@ -39,7 +39,8 @@ impl TilesInFlight {
         self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
     }
 
-    /// Receives consecutive pixels of a tile, none of which was received before.
+    /// Stores consecutive pixels of a tile, of which the first has the index `first`. Fails if a pixel is
+    /// outside the tile, has an impossible value, or was received before.
     pub(super) fn take_pixels(
         &mut self,
         id: u32,
@@ -75,7 +76,7 @@ impl TilesInFlight {
         Ok(())
     }
 
-    /// Completes a tile. All its pixels must have been received.
+    /// Removes and returns a tile. All its pixels must have been received.
     pub(super) fn complete(
         &mut self,
         id: u32,
@@ -94,7 +95,8 @@ impl TilesInFlight {
         FinishedTile::new(tile, records, *limits.format(), counters).ok_or(not_complete)
     }
 
-    /// Returns all tiles as events, in reverse order. The card was working on the oldest `at_work` ones.
+    /// Removes all tiles and adds an event `TileLost` for each, the newest first. The card was working on the
+    /// `at_work` oldest ones.
     pub(super) fn give_back(&mut self, at_work: usize, events: &mut VecDeque<Event>) {
         while let Some(TileInFlight { assignment, .. }) = self.0.pop() {
             let was_at_work = self.0.len() < at_work;

@@ -1,6 +1,7 @@
 //! Card image as it is sent to cards, with checksums that are computed once for all cards, and the progress
-//! of sending it to one card. Only runs of lines that the card lacks are sent. They follow from the card
-//! image that the card holds or, if that is unknown, from the checksums of the chunks in its memory.
+//! of sending it to one card. Only runs of lines that the card lacks are sent. These runs are known if the
+//! card holds this card image or the previous one. Otherwise they follow from the checksums of the chunks in
+//! the card's memory.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -35,7 +36,7 @@ impl Upload {
         Self { lines, checksum, chunks: OnceLock::new(), change: None }
     }
 
-    /// Records the difference to image `before`, for cards that hold it.
+    /// Records the difference from the previous card image `before`, for cards that hold that image.
     #[must_use]
     pub fn after(self, before: &Self) -> Self {
         let runs = changed_runs(before.lines(), self.lines());

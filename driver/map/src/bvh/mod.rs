@@ -1,4 +1,4 @@
-//! Bounding volume hierarchy. The builder obvhs makes a binary tree, which is folded into the chip's wide
+//! Bounding volume hierarchy. The crate obvhs builds a binary tree, which is folded into the chip's wide
 //! nodes by the surface area heuristic.
 
 use obvhs::aabb::Aabb;
@@ -29,7 +29,8 @@ pub struct Hierarchy {
 /// Indices of a leaf's triangles, by slot.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// Flags that leaves store for their triangles, indexed by material; false past the end of a list.
+/// Material flags that leaves store for their triangles. The lists are indexed by material; a missing entry
+/// counts as false.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Finishes<'a> {
     /// True for materials whose triangles may have cut-outs.
@@ -110,8 +111,8 @@ const MAX_CONCENTRIC: usize = 64;
 /// Fractions of the nodes that the two calls of [`reinsertion::optimize`] try to reinsert in their first
 /// rounds.
 const REINSERTED: [f32; 2] = [0.2, 0.4];
-/// Number of the builder's first passes, those nearest to the leaves, that join only boxes adjacent in its
-/// sort order.
+/// Number of first passes in which the builder joins only boxes that are adjacent in its sort order. The
+/// first passes make the nodes nearest to the leaves.
 const SEARCH_DEPTH: usize = 2;
 
 /// Builds the hierarchy of at least one triangle or instance. The result depends neither on the machine nor
@@ -247,8 +248,7 @@ fn joined(
     Ok(hierarchy)
 }
 
-/// Builder's tree of boxes. Each box has a leaf of its own; leaves of several triangles are made when the
-/// tree is folded.
+/// Builds a binary tree with one leaf per box. Leaves of several triangles are made when the tree is folded.
 fn binary(boxes: &[Aabb]) -> Bvh2 {
     let (distance, precision) = (PlocSearchDistance::High, SortPrecision::U128);
     let indices = (0..boxes.len() as u32).collect();
@@ -261,9 +261,9 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
 /// Input of the builder: one box for many triangles whose boxes have a common centre, and one box for each
 /// other triangle.
 ///
-/// The builder joins a box with the one for which the area of the union is least. For nested boxes this area
-/// is the same with every smaller box, so that hardly any two boxes are each other's nearest, and the builder
-/// would search all of them for each pair that it joins.
+/// The builder joins a box with the one for which the area of the union is least. The union of a box with any
+/// box inside it has the same area. Of many nested boxes, hardly any two are therefore each other's nearest,
+/// and the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,

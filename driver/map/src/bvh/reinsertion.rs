@@ -14,9 +14,9 @@ use rdst::{RadixKey, RadixSort};
 /// tries.
 const ROUNDS: usize = 16;
 
-/// Maximum number of subtrees that a round tries. The nodes with the largest areas make most of a tree's
-/// cost: a round that tried all subtrees of a million triangles would take twice the time, and rays would
-/// read 2 % less.
+/// Maximum number of subtrees that a round tries. The nodes with the largest areas cause most of a tree's
+/// cost. For a million triangles, a round that tried all subtrees would take twice the time, and rays would
+/// read only 2 % less memory.
 const MAX_TRIED: usize = 100_000;
 
 /// Subtree that can be reinserted.
@@ -36,8 +36,8 @@ impl RadixKey for Candidate {
     }
 }
 
-/// Optimizes a tree in rounds. The first one tries to reinsert the fraction `share` of the nodes, those with
-/// large areas.
+/// Optimizes a tree in rounds. The first round tries to reinsert the fraction `share` of the nodes, chosen by
+/// large area.
 pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     if tree.nodes.first().is_none_or(Bvh2Node::is_leaf) {
         return;
@@ -63,8 +63,8 @@ pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     }
 }
 
-/// Finds the best positions for `count` nodes with large areas. Returns those that decrease the tree's area,
-/// sorted by descending decrease.
+/// Finds the best positions for `count` nodes with large areas. Returns the reinsertions that decrease the
+/// tree's area, sorted by descending decrease.
 fn reinsertions(tree: &Bvh2, count: usize) -> Vec<Reinsertion> {
     let first = tree.nodes.iter().zip(0..).take(2 * (count + 1)).skip(1);
     let mut candidates: Vec<Candidate> =

@@ -7,7 +7,7 @@ use photoncard_shared::layout::TriangleId;
 use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus, set};
 use super::sides::Sides;
 
-/// Sixteen triangles. Unused lanes have coincident corners, which no ray or chord hits.
+/// Sixteen triangles. The corners of an unused lane coincide, so that no ray or chord hits it.
 #[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
@@ -58,10 +58,11 @@ impl Block {
     }
 }
 
-/// Returns the normals of the planes through a point and each edge of a triangle, and six times the signed
-/// volume of the tetrahedron of the point and the triangle.
+/// Returns the normals of the three planes through `point` and an edge of triangle `lane`. Also returns six
+/// times the signed volume of the tetrahedron of the point and the triangle.
 ///
-/// Two triangles that share an edge have exactly opposite normals for it, so that no ray passes between them.
+/// The two triangles of a shared edge have exactly opposite normals for it, so that no ray passes between
+/// them.
 #[inline(always)]
 fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
     let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
@@ -70,7 +71,8 @@ fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32
     (planes, dot(a, planes[0]))
 }
 
-/// Kernel that finds the nearest triangle along a ray, in a ball's coordinates.
+/// Kernel that finds the nearest triangle along a ray. Coordinates are relative to a ball's centre, in units
+/// of its radius.
 pub(super) struct FirstOnWay<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) origin: Vec3,

@@ -1,8 +1,8 @@
 //! Parallel chords of a ball.
 //!
 //! The area of a surface is its projected area divided by the cosine between the normals, `A = A_p / cos`.
-//! Evenly spread chords measure it: each chord represents an equal part of the area of the disc perpendicular
-//! to the chords, and each crossing of a chord with a surface represents that part divided by the cosine.
+//! Evenly spread chords measure it. Each chord represents an equal part of the disc perpendicular to the
+//! chords, and each crossing with a surface represents this part divided by the cosine.
 
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;
@@ -102,8 +102,8 @@ impl Chords {
     }
 }
 
-/// Coordinate frame whose third axis is a surface normal, with a reference point outside all solids; in a
-/// ball's coordinates.
+/// Coordinate frame of parallel chords, with a reference point outside all solids. Its coordinates are
+/// relative to a ball's centre, in radii of the ball.
 pub(super) struct ChordFrame {
     /// Orthonormal axes: two perpendicular to the chords, and the surface normal, to which the chords are
     /// parallel.

@@ -1,9 +1,9 @@
-//! Photons as evidence whether light reaches a surface that another one covers.
+//! Photons as evidence of whether light reaches a surface that another surface covers.
 //!
-//! A wall behind a picture, a floor under a carpet, or the inside of a box of double-sided sheets is a
-//! surface without light, which no photon hits. The boards of a shelf and the slats of a blind are lit.
-//! Geometry cannot distinguish them: meshes are open, touch each other, or are less than a millimetre apart.
-//! The photons of the map can.
+//! A wall behind a picture, a floor under a carpet, or the inside of a box of double-sided sheets is unlit,
+//! and no photon hits it. The boards of a shelf and the slats of a blind are lit. Geometry cannot distinguish
+//! the two cases: meshes are open, touch each other, or are less than a millimetre apart. The photons of the
+//! map can.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -35,8 +35,8 @@ struct Place {
 pub(super) struct Evidence {
     places: Vec<Place>,
     stack: Vec<Child>,
-    /// Positions of photons whose normals are near the chords' direction, relative to the ball's centre, in
-    /// radii along the frame's axes. Unused lanes are infinitely far away.
+    /// Positions of the photons whose normals are nearly parallel to the chords. Coordinates are along the
+    /// frame's axes, relative to the ball's centre, in radii. Unused lanes are infinitely far away.
     along: Vec<LaneVector>,
     /// Squared distances, along the surface, from the measured photon to the photons on its own surface, m^2.
     own: Vec<f32>,
@@ -105,8 +105,8 @@ impl Evidence {
         }
     }
 
-    /// Chooses the photons whose normals are near the direction of a frame's chords, and the distance within
-    /// which they are evidence: the distance from `photon` to its [`SEVERAL`]-th neighbour on its own
+    /// Chooses the photons whose normals are nearly parallel to a frame's chords, and the distance within
+    /// which they are evidence. This is the distance from `photon` to its [`SEVERAL`]-th neighbour on its own
     /// surface, at most `most` metres.
     pub(super) fn choose(&mut self, ball: Ball, frame: &ChordFrame, (photon, most): (Vec3, f32)) {
         self.along.clear();

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use crate::pack::CardImage;
 use crate::photon::Importons;
 
-/// Squared radius with which searches in a node start, divided by the squared distance of the k-th neighbour
-/// of the node's sampled photon.
+/// Ratio of two squared distances: the radius with which a search in a node starts, and the distance of the
+/// k-th neighbour of the photon sampled there.
 const MOST: f32 = 1.4;
-/// Fraction of the sampled photons whose k-th neighbour lies within the usual distance.
+/// Fraction of the sampled photons whose k-th neighbour lies within `GatherDistances::usual`.
 const USUAL_SHARE: f64 = 0.95;
 /// Automatic maximum distance divided by the greatest sampled distance. It exceeds 1 because photons that are
 /// not sampled may have greater distances.
@@ -61,7 +61,8 @@ pub(crate) struct GatherDistances {
     pub(crate) greatest: f32,
 }
 
-/// Distances of the k-th neighbours of sampled photons, one photon per node of a photon map with leaves.
+/// Distances of the k-th neighbours of sampled photons. For each node of the photon map that has leaves, one
+/// photon in them is sampled.
 pub(crate) struct SampledDistances {
     neighbors: u32,
     samples: Vec<Sample>,

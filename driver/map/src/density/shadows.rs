@@ -9,7 +9,8 @@ use super::chords::{BATCHES, Batch, ChordFrame, Chords};
 use super::crossings::{Crossings, Layer};
 use super::lanes::{Lane, LaneVector, at, greatest, least};
 
-/// Kernel that adds the crossings of chords with the triangles of some blocks.
+/// Kernel that adds the crossings of the chords with the triangles of `blocks`, and the changes of the
+/// chords' depths, to `crossings`.
 pub(super) struct CrossAll<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) frame: &'a ChordFrame,
@@ -66,7 +67,7 @@ struct Shadows {
     slopes: Lane,
     /// 1 if the front faces up, else 0.
     is_front: Lane,
-    /// Infinite for triangles that no chord hits, else 0.
+    /// Infinite for triangles that are too steep for chords (`MIN_COSINE`), else 0.
     steep: Lane,
     lower: [Lane; 2],
     upper: [Lane; 2],
@@ -101,8 +102,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // For the two triangles of a shared edge these coefficients are equal, to the last bit,
-                // except for the sign, so that both triangles test the same line.
+                // For the two triangles of a shared edge these coefficients are equal up to the sign, to the
+                // last bit. Both triangles therefore test the same line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
@@ -174,8 +175,8 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Returns, for each chord of a batch, the height at which it hits the plane of a triangle, and 0 if it
-    /// hits the triangle within the ball, else 1.
+    /// Returns two values for each chord of a batch: the height at which it hits the plane of a triangle, and
+    /// 0 if it hits the triangle within the ball, else 1.
     #[inline(always)]
     fn cross(&self, triangle: usize, batch: &Batch) -> (Lane, [u32; LANES]) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
@@ -213,8 +214,8 @@ fn along([a, b, c]: [f32; 3], [x, y, z]: &LaneVector) -> Lane {
     sum
 }
 
-/// Section of a triangle with the horizontal plane through the reference point: a segment from `start` to
-/// `end`, relative to that point, with the front on its left.
+/// Segment from `start` to `end` in which the horizontal plane through the reference point cuts a triangle.
+/// Coordinates are relative to this point. The front of the triangle is on the segment's left.
 struct Cut {
     start: [f32; 2],
     end: [f32; 2],

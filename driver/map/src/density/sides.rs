@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::pack::CardImage;
 
-/// Front and back of a triangle.
+/// Properties of the front and the back of a triangle.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sides {
     /// Codes of the normals of front and back; `None` for a side where no photons are stored.
@@ -68,7 +68,8 @@ struct Finish {
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
-    /// True with partial coverage (`BLEND`), which is no cut-out: the powers of photons account for it.
+    /// True with partial coverage (glTF `BLEND`). It is no cut-out, because the powers of photons account for
+    /// it.
     blends: bool,
 }
 
@@ -242,8 +243,8 @@ impl Sides {
 }
 
 /// Returns, for each triangle at an edge, its index and the index of the next triangle by angle on its back
-/// side, or `None` instead if the two cannot bound a solid. An item of `triangles` is whether the triangle
-/// has the edge in the given direction, the triangle's index, and its corners.
+/// side. The latter is `None` if the two cannot bound a solid. Each item of `triangles` holds whether the
+/// triangle has the edge in the given direction, its index, and its corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,

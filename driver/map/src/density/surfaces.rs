@@ -13,7 +13,7 @@ use super::lanes::Lane;
 /// Number of normal codes.
 const CODES: usize = 1 << u8::BITS;
 
-/// For each normal code, the codes that a gather counts as the same surface.
+/// For each code of a normal, the codes of the normals that a gather counts as the same surface.
 pub(super) struct SameSurfaces([OnceLock<[bool; CODES]>; CODES]);
 
 impl SameSurfaces {
@@ -21,8 +21,8 @@ impl SameSurfaces {
         Self([const { OnceLock::new() }; CODES])
     }
 
-    /// Returns a flag per normal code: true if a gather at a photon of the code `normal` counts photons with
-    /// that code.
+    /// Returns a flag for each normal code `c`: true if a gather at a photon with the code `normal` counts
+    /// photons with the code `c`.
     fn of(&self, normal: u8) -> &[bool; CODES] {
         self.0[usize::from(normal)].get_or_init(|| {
             let (mut same, mut code) = (SameSurface::new(normal), 0_u8);
@@ -48,7 +48,7 @@ struct SurfaceLanes {
     places: [Lane; 3],
     slopes: Lane,
     normals: [u8; LANES],
-    /// For each point, [`Self::slopes`] if it belongs to the chosen surface, else 0.
+    /// For each point, its slope if [`OpenSurfaces::choose`] has chosen it, else 0.
     areas: Lane,
 }
 
@@ -96,8 +96,8 @@ pub(super) struct FractionWithin<'a> {
     pub(super) surfaces: &'a OpenSurfaces,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// Points at most this far above or below the photon's plane count as in the plane, because the photon
-    /// grid can move a photon off its surface. In radii of the ball around the photon's cluster.
+    /// Distance above or below the photon's plane up to which a point counts as in the plane, in radii of the
+    /// ball around the photon's cluster. The photon grid can move a photon off its surface.
     pub(super) lift: f32,
 }
 
@@ -130,7 +130,8 @@ impl Kernel for FractionWithin<'_> {
 pub(super) struct Areas {
     /// Area within the photon's sphere, divided by the area of its disc.
     pub(super) fraction: f32,
-    /// Area within a larger sphere that the photon cannot see, divided by the whole area there.
+    /// Hidden fraction: the area that the photon cannot see, divided by the whole area, both within a larger
+    /// sphere.
     pub(super) hidden: f32,
     /// Area within the photon's sphere that lies in its visible region, divided by the region's area in the
     /// plane.
@@ -139,8 +140,8 @@ pub(super) struct Areas {
     pub(super) points: f32,
 }
 
-/// Visible region of a photon, in a ball's coordinates: its axes in the chords' frame, the sectors that are
-/// visible as a whole (`inner`) and those that contain all that is visible (`outer`).
+/// Visible region of a photon, in a ball's coordinates. `axes` are its axes in the chords' frame. `inner` are
+/// the sectors that are visible as a whole, and `outer` the sectors that contain everything visible.
 pub(super) struct SeenRegion {
     pub(super) axes: [[f32; 3]; 3],
     pub(super) inner: Sectors,
@@ -157,8 +158,7 @@ pub(super) struct AreasWithin<'a> {
     pub(super) radius: f32,
     /// Radius of the larger sphere, in radii of the ball.
     pub(super) outer_radius: f32,
-    /// Points at most this far above or below the photon's plane count as in the plane, because the photon
-    /// grid can move a photon off its surface. In radii of the ball around the photon's cluster.
+    /// See `FractionWithin::lift`.
     pub(super) lift: f32,
 }
 
@@ -209,7 +209,7 @@ impl Kernel for AreasWithin<'_> {
 
 impl SurfaceLanes {
     /// Vectors from a photon's position to the points. Points at most `lift` above or below the photon's
-    /// plane count as in the plane: the photon grid can move a photon off its surface, and the disc fraction
+    /// plane count as in the plane. The photon grid can move a photon off its surface, and the disc fraction
     /// of a plane must still be 1.
     #[inline(always)]
     fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {

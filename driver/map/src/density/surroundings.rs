@@ -1,8 +1,9 @@
-//! Triangles in a ball, found once for all chords and short rays in it.
+//! List of the triangles in a ball. It is built once and used for all chords and short rays in the ball.
 //!
 //! Traversing the hierarchy for every ray would visit the same few leaves many times. Instead, one traversal
-//! finds all triangles in a ball. Sixteen of them at a time are then tested against one ray, or sixteen
-//! chords against one of them. Coordinates are relative to the ball's centre and in units of its radius.
+//! finds all triangles in a ball. Then sixteen triangles at a time are tested against one ray, or sixteen
+//! chords at a time against one triangle. Coordinates are relative to the ball's centre and in units of its
+//! radius.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -25,7 +26,7 @@ const CROWD: usize = 512;
 /// Number of triangles above which repeated triangles are omitted: thousands of coincident triangles act as
 /// one.
 const MAX_WITH_TWINS: usize = 512;
-/// Maximum number of triangles of a plain wall within a ball.
+/// Maximum number of triangles in a ball that `Surroundings::is_plain` tests for coplanarity.
 const MAX_PLAIN: usize = 24;
 /// Minimum cosine between the normals of triangles of one plane. It allows a deviation of a thousandth of the
 /// radius at the ball's border.
@@ -42,7 +43,7 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list, which is
+    /// Finds the triangles in a ball. Returns false if there are too many or one is too large. The list is
     /// then incomplete and must not be used.
     ///
     /// # Errors
@@ -63,8 +64,8 @@ impl Surroundings {
         all
     }
 
-    /// Returns whether the triangles in a ball are exactly one plain wall through its centre, with the normal
-    /// of `wall`. The list of triangles does not change.
+    /// Returns whether the triangles in a ball form one plane without holes that passes through its centre,
+    /// has the normal of `wall`, and contains all photons of `wall`. The list of triangles does not change.
     ///
     /// # Errors
     /// If the card image is malformed.
@@ -121,8 +122,8 @@ impl Surroundings {
         true
     }
 
-    /// Nearest triangle from `origin` along a unit vector within `max_distance`: its distance, metres, and
-    /// its unit normal on the side of `origin`.
+    /// Finds the nearest triangle from `origin` along a unit vector. Returns its distance (metres, at most
+    /// `max_distance`) and its unit normal, which faces the origin.
     pub(super) fn first_on_way(
         &self,
         origin: Vec3,
@@ -138,14 +139,14 @@ impl Surroundings {
             .then_some((distance, if normal.dot(direction) > 0.0 { -normal } else { normal }))
     }
 
-    /// Collects the crossings of chords within the ball.
+    /// Replaces the content of `crossings` by the crossings of `chords` with the listed triangles.
     pub(super) fn cross(&self, frame: &ChordFrame, chords: &Chords, crossings: &mut Crossings) {
         crossings.clear(frame.open.z);
         run(CrossAll { blocks: &self.blocks, frame, chords, crossings });
     }
 }
 
-/// Hypothesis of a plain wall: a surface normal, and points that should lie on it.
+/// Assumption that photons lie on one plane, which `Surroundings::is_plain` tests.
 #[derive(Clone, Copy)]
 pub(super) struct PlainWall<'a> {
     /// Code of the wall's normal.
@@ -157,14 +158,15 @@ pub(super) struct PlainWall<'a> {
 }
 
 impl PlainWall<'_> {
-    /// Returns whether all positions are within `lift` of the plane through the ball's centre.
+    /// Returns whether all positions are within `lift` of the plane through the ball's centre that is
+    /// perpendicular to `normal`.
     fn holds(&self, ball: Ball, normal: Vec3) -> bool {
         self.places.iter().all(|place| (*place - ball.centre).dot(normal).abs() <= self.lift)
     }
 }
 
-/// Returns true if coplanar triangles cover the disc of radius 1 around the origin exactly once: one triangle
-/// covers the origin, and each edge within the disc is shared with one other triangle.
+/// Returns true if coplanar triangles cover the disc of radius 1 around the origin exactly once. This holds
+/// if one triangle covers the origin, and each edge within the disc is shared with one other triangle.
 fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     let edges = |[a, b, c]: [Vec3; 3]| [(a, b), (b, c), (c, a)];
     let is_left = |(a, b): (Vec3, Vec3)| (b - a).cross(-a).dot(normal) >= 0.0;

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 pub(crate) const SIDE: u32 = 32;
 /// Maximum number of subdivided cells. The thresholds of each take 4.2 kB.
 const MAX_DIVIDED: usize = 16;
-/// Minimum light of a subdivided cell, if all of it were as bright as its brightest texel, divided by all
-/// light. This ratio is the variance that the cell adds to a light sample, relative to the squared mean.
+/// Minimum of `L w / P` for a cell to be subdivided, where L is the radiance of its brightest texel, w its
+/// solid angle, and P the light of all cells. This ratio is the variance that the cell adds to a light
+/// sample, relative to the squared mean.
 const LEAST_VARIANCE: f64 = 1.0 / 16.0;
 /// Minimum contrast of a subdivided cell: the light of its brightest part divided by the mean of its parts.
 const LEAST_CONTRAST: f64 = 4.0;
@@ -64,7 +65,8 @@ impl Parts {
         divided.into_iter().map(|(_, parts)| parts).collect()
     }
 
-    /// Parts of a cell with its weight, and the contrast: the greatest light of a part divided by the mean.
+    /// Divides a cell with a given weight into parts. Also returns the contrast: the light of the brightest
+    /// part divided by the mean of the parts.
     fn new(environment: &Environment, [columns, rows]: [u32; 2], (cell, weight): (u32, f64)) -> (f64, Self) {
         let [row, column] = [cell / columns, cell % columns];
         let border = |row: u32| libm::cos(PI * f64::from(row) / f64::from(rows));
@@ -100,8 +102,8 @@ impl Parts {
     }
 }
 
-/// Radiance of the brightest texel of each cell, averaged over channels, including texels that interpolation
-/// carries into the cell.
+/// Maximum radiance, averaged over channels, of the texels of each cell. Texels that interpolation carries
+/// into the cell count too.
 fn brightest(environment: &Environment, [columns, rows]: [u32; 2]) -> Vec<f64> {
     let Environment { width, height, .. } = *environment;
     let mut brightest = vec![0.0_f64; (columns * rows) as usize];

@@ -1,5 +1,5 @@
 //! Lights of a scene in the format of a card. Emissive triangles, point lights and spot lights are in a light
-//! tree; distant lights and the environment are beside it. The module also computes the probabilities with
+//! tree; distant lights and the environment are separate. The module also computes the probabilities with
 //! which shadow rays and photons choose each of them.
 
 mod colour;
@@ -130,7 +130,7 @@ impl Lights {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }
 
-    /// Lights of the card image's header. `texture` is the index of the environment's texture.
+    /// Light parameters of the card image's header. `texture` is the index of the environment's texture.
     pub(crate) fn header(&self, texture: u32) -> image::Lights {
         let environment = self.environment.as_ref();
         let cells = environment.map_or([1; 2], |map| [map.cells.columns, map.cells.rows]);
@@ -238,8 +238,9 @@ impl Spot {
     /// Integral of the falloff over all directions, sr.
     fn solid_angle(&self) -> f64 {
         let [scale, offset] = [self.scale, self.offset].map(f64::from);
-        // The square root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached`
-        // at the inner cone or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
+        // The square root of the falloff rises linearly in the cosine: from 0 at the outer cone to `reached`
+        // at the inner cone, or at the axis. Within the inner cone it is 1. `whole` is `1 - cos` of the inner
+        // cone.
         let reached = (scale + offset).clamp(0.0, 1.0);
         let whole = (1.0 - (1.0 - offset) / scale).max(0.0);
         2.0 * PI * (reached * reached * reached / (3.0 * scale) + whole)

@@ -24,8 +24,8 @@ pub(super) struct Level {
 
 impl Level {
     /// Maximum distance from a cell's centre at which it contributes, cells. Interpolation carries a texel at
-    /// the border half a texel farther. If [`STEP`] does not divide a side, a cell contains the whole cells
-    /// of the finer level that begin in it, which extend beyond its border by up to 0.67 cells.
+    /// the border half a texel farther. If [`STEP`] does not divide a side, a cell consists of all finer
+    /// cells that begin in it. They extend beyond its border by up to 0.67 cells.
     pub(super) const REACH: f64 = 1.5;
     /// Weight of a cell whose centre is not on the triangle. It is small, but not 0, because the cell may be
     /// the only one that emits.

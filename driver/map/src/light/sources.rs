@@ -51,9 +51,9 @@ pub(crate) struct Sources {
     pub(crate) targets: Targets,
     /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
     pub(crate) power: f64,
-    /// Maximum over the sources of the power in the strongest channel divided by the probability, watts. The
-    /// unit of photon powers is derived from it. If a fraction of the photons is aimed, the other photons are
-    /// stronger, and so is this maximum.
+    /// Maximum of `p / q` over the sources, watts: p is the power of a source in its strongest channel, and q
+    /// is the probability of choosing the source. The unit of photon powers is derived from it. If a fraction
+    /// of the photons is aimed, the other photons are stronger, and so is this maximum.
     pub(crate) strongest: f32,
 }
 
@@ -85,8 +85,8 @@ impl Sources {
         (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
     }
 
-    /// Returns sources most of whose photons are aimed at the scene's surfaces other than lamps, which may be
-    /// far from the lights; `None` if there are no such surfaces.
+    /// Returns sources that aim most of their photons at the scene's surfaces other than lamps, because these
+    /// surfaces may be far from the lights. Returns `None` if there are no such surfaces.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
@@ -158,7 +158,7 @@ fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
     (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(MIN_AIMED_SHARE, 1.0)
 }
 
-/// Lower and upper threshold of a source, in units of 2^-32.
+/// Cumulative probabilities before and after a source, in units of 2^-32.
 fn share(thresholds: &[u32], index: usize) -> (u32, u32) {
     let lower = index.checked_sub(1).map_or(0, |before| thresholds[before]);
     (lower, thresholds[index])
@@ -170,7 +170,8 @@ fn enlarged((lower, upper): (Vec3, Vec3)) -> [Vec3; 2] {
     [lower - margin, upper + margin]
 }
 
-/// Sources being collected, with their powers and their powers in the strongest channel, watts.
+/// Sources that are being collected. For each source, its power averaged over channels and its power in the
+/// strongest channel, watts.
 #[derive(Default)]
 struct AllSources {
     list: Vec<Source>,

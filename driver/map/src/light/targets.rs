@@ -2,8 +2,8 @@
 //!
 //! A sphere is chosen in proportion to its density times the solid angle that it subtends, and then a
 //! direction uniformly within this angle. Where spheres overlap, a direction can be chosen through any of
-//! them: its density is the sum of the densities of the spheres in this direction, divided by the sum over
-//! all spheres of density times solid angle.
+//! them. Its density is `sum d_i / sum (d_k w_k)`: the densities of the spheres in this direction, divided by
+//! the sum over all spheres of density times solid angle.
 
 use std::f32::consts::PI;
 
@@ -40,7 +40,7 @@ pub(crate) struct Aim {
 /// Fraction of the photons that [`Targets::lit`] aims. The other photons are for surfaces outside the
 /// targets.
 const AIMED_SHARE: f32 = 0.9;
-/// Fraction of the photons that are aimed at boxes.
+/// Fraction of the photons that `Targets::boxes` aims.
 const BOX_SHARE: f32 = 0.5;
 /// Minimum emission of a lamp, relative to the greatest emission in the scene.
 const LAMP_SHARE: f32 = 0.01;
@@ -89,14 +89,15 @@ impl Targets {
         )
     }
 
-    /// Targets around boxes, given by their lower and upper corners and their weights: the variance that a
-    /// photon of power 1 in the box adds. Half of the photons are aimed at them.
+    /// Targets around boxes. Each box has a lower and an upper corner and a weight: the variance that a
+    /// photon of power 1 in the box adds to the picture. Half of the photons are aimed at the boxes.
     pub(crate) fn boxes(boxes: impl IntoIterator<Item = ([Vec3; 2], f64)>) -> Self {
         let boxes = boxes.into_iter().map(|([lower, upper], weight)| ([lower, upper, lower], Some(weight)));
         Self::holding(boxes.collect(), BOX_SHARE)
     }
 
-    /// Targets around all of the triangles, with their weights.
+    /// Targets that contain all of the triangles: at most `MAX_SPHERES` spheres, found by repeated
+    /// splitting.
     fn holding(all: Vec<Weighted>, share: f32) -> Self {
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
@@ -162,8 +163,8 @@ impl Targets {
         self.spheres.iter().map(Sphere::weighted_area).sum()
     }
 
-    /// Samples a direction from a point through a sphere, by a point of the unit square; `None` if there are
-    /// no spheres.
+    /// Samples a direction from `from` through a sphere. `[c, d]` is a point of the unit square. Returns
+    /// `None` if there are no spheres.
     pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.solid_angle(from);
         let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.weighted_angle(from)))?;
@@ -174,9 +175,9 @@ impl Targets {
         Some(Aim { towards, measure: all / density })
     }
 
-    /// Samples a line with a given direction through a sphere, by a point of the unit square. Returns the
-    /// line's point in the plane through the origin perpendicular to the direction; `None` if there are no
-    /// spheres.
+    /// Samples a line with a given direction through a sphere. `[c, d]` is a point of the unit square.
+    /// Returns the point at which the line meets the plane through the origin perpendicular to it; `None` if
+    /// there are no spheres.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
         let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::weighted_area))?;

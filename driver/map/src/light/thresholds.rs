@@ -1,10 +1,11 @@
-//! Discrete distributions in integers: cumulative shares of 2^32, in proportion to weights.
+//! Discrete probability distributions in integers: cumulative probabilities in units of 2^-32.
 
-/// Sum of all shares: 2^32.
+/// Number of units in the probability 1: 2^32.
 pub(super) const ALL: f64 = 4_294_967_296.0;
 
-/// Computes cumulative shares of 2^32 in proportion to weights. Each share is at least 1, so that every index
-/// can be chosen. The last threshold is 2^32 - 1. If all weights are 0, the shares are equal.
+/// Computes cumulative probabilities in proportion to weights, in units of 2^-32. Each probability is at
+/// least one unit, so that every index can be chosen. The last threshold is 2^32 - 1. If all weights are 0,
+/// the probabilities are equal.
 pub(crate) fn thresholds(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let spare = ALL - 1.0 - weights.len() as f64;

@@ -2,8 +2,8 @@
 //! power.
 //!
 //! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018,
-//! *Importance sampling of many lights with adaptive tree splitting*), in bins along each axis, and each half
-//! is split again, so that a node has four children. A split that would make the tree deeper than a bit trail
+//! *Importance sampling of many lights with adaptive tree splitting*), in bins along each axis. Each half is
+//! split again, so that a node has four children. A split that would make the tree deeper than a bit trail
 //! can encode is replaced by a median split.
 
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -282,7 +282,8 @@ impl Summary {
         self.power * self.cone.measure() * area
     }
 
-    /// Record of the emitters as a child of a node with `power` watts.
+    /// Record of these emitters as a child of a node. `power` is the power of all emitters of the node,
+    /// watts.
     fn child(&self, power: f64, link: LightLink) -> LightChild {
         let middle = self.middle();
         let greatest = self.lower.abs().max(self.upper.abs()).max_element();

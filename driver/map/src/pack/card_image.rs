@@ -16,9 +16,9 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::EnvironmentCells,
 ];
 
-/// Number of lines to allocate for a photon map, beyond the `lines` of an image. Without them the allocator
-/// copies the image when it grows, which takes seconds for a large image. Allocated lines that are not
-/// written take no memory.
+/// Number of spare lines to allocate for a photon map, in addition to the `lines` of an image. Without them
+/// the allocator copies the image when it grows, which takes seconds for a large image. Allocated lines that
+/// are not written take no memory.
 pub(super) fn room_for_photons(lines: usize) -> usize {
     const PHOTON_LINES: usize = 1 << 20;
     (lines / 16).min(PHOTON_LINES)

@@ -15,7 +15,7 @@ pub(super) struct PackedCorners {
 }
 
 impl PackedCorners {
-    /// Encodes the attributes of a scene whose triangles are in `leaves`. `uncovered` are
+    /// Encodes the vertex attributes of a scene whose triangles are in `leaves`. `uncovered` is the result of
     /// [`Scene::uncovered_materials`].
     pub(super) fn new(
         scene: &Scene,
@@ -58,8 +58,8 @@ impl PackedCorners {
             let tangents: Vec<Tangents> = triangles().map(|triangle| tangents(scene, triangle)).collect();
             self.records.extend(Tangents::to_records(&tangents));
         }
-        // At most 2^28 triangles have at most two records each, and two per leaf for tangents: the upper bit
-        // is free.
+        // The upper bit of the index is free, because there are at most 2^28 triangles with at most two
+        // records each, and two records per leaf for tangents.
         let first = self.records.len() as u32;
         for &(index, triangle) in leaf {
             let emitter = lights.of_triangle(index);

@@ -1,9 +1,9 @@
 //! Flat glass: thin walls, and glass solids that are panes.
 //!
 //! A pane is a slab with parallel faces. Light that passes both faces keeps its direction, so that shadow
-//! rays can pass a pane like a thin wall. The faces have a material record of their own ([`PANE`]), which
-//! gives light that enters the transmittance of the whole slab. The model ignores the lateral shift of the
-//! light by refraction, and the rim of the slab.
+//! rays can pass a pane like a thin wall. The faces have a material record of their own ([`PANE`]). It
+//! applies the transmittance of the whole slab to light that enters. The model ignores the lateral shift of
+//! the light by refraction, and the rim of the slab.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use photoncard_shared::layout::{self, PANE, Reflectance, THIN_WALLED};
 
 use super::materials::{bare_record, transmission_of};
 
-/// Minimum fraction of a slab's area that its two faces have.
+/// Minimum fraction of a slab's surface area that its two faces make up.
 const FACES: f32 = 0.9;
 /// Minimum ratio of the areas of two faces taken as equal, and minimum cosine between normals taken as
 /// parallel.

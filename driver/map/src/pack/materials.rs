@@ -16,7 +16,7 @@ pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
     scene.materials.iter().filter_map(|material| material.layers.as_deref()).map(layers_record).collect()
 }
 
-/// Records of a scene's materials. `uncovered` are [`Scene::uncovered_materials`].
+/// Records of a scene's materials. `uncovered` is the result of [`Scene::uncovered_materials`].
 pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec<layout::Material> {
     let mut has_attributes = vec![false; scene.materials.len()];
     for (index, triangle) in (0..).zip(scene.stored_triangles()) {
@@ -56,7 +56,7 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     })
 }
 
-/// Returns [`NARROW_LOBE`] if rays follow the material's lobe, else 0.
+/// Returns [`NARROW_LOBE`] if the material has a narrow lobe, else 0.
 fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
     if scene.has_narrow_lobe(material) { NARROW_LOBE } else { 0 }
 }
@@ -152,8 +152,8 @@ pub(super) fn transmission_of(material: &Material) -> Option<Transmission> {
     }
 }
 
-/// Ratio of a dielectric's reflectance at normal incidence, as stated, to that of its index of refraction n,
-/// `((n - 1) / (n + 1))^2`; at most 1.
+/// Ratio `F0 / ((n - 1) / (n + 1))^2`, at most 1. F0 is the stated reflectance of a dielectric at normal
+/// incidence, and n its index of refraction.
 fn specular_share(dielectric: Vec3, ior: f32) -> f32 {
     let amplitude = (ior - 1.0) / (ior + 1.0);
     let of_index = amplitude * amplitude;

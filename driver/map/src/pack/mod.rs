@@ -33,10 +33,10 @@ pub use self::error::PackError;
 use self::flat_glass::Glazing;
 pub(crate) use self::writer::ImageWriter;
 
-/// Memory that packing takes per triangle, in addition to the scene, mainly for binary trees, bytes.
+/// Memory that packing takes per triangle, bytes: mainly binary trees, without the scene itself.
 const BYTES_OF_A_TRIANGLE: u64 = 700;
 
-/// Card image of a scene without photons, and the sources of photons.
+/// Card image of a scene before photons are added, and the sources of photons.
 #[derive(Clone)]
 pub struct PackedScene {
     image: CardImage,
@@ -98,8 +98,8 @@ impl PackedScene {
         self.image
     }
 
-    /// Grid of photon positions: the finest grid that covers the scene or, if all detail is in a small part
-    /// of the scene, this part and its surroundings.
+    /// Grid of photon positions. It is the finest grid that covers the scene or, if all detail is in a small
+    /// part of the scene, this part and its surroundings.
     pub fn photon_grid(&self) -> PhotonGrid {
         let part = self.detailed_part.map(|corners| corners.map(|corner| corner.to_array()));
         let whole = || self.image.bounds().map(|NodeBox { lower, upper }| [lower, upper]);
@@ -137,8 +137,8 @@ impl PackedScene {
         self.keeps_photons
     }
 
-    /// Returns whether there are both materials with narrow lobes and punctual lights. Only the caustic map
-    /// shows such lights in such lobes.
+    /// Returns whether the scene has both materials with narrow lobes and punctual lights. Only the caustic
+    /// map shows reflections of these lights by narrow lobes.
     pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
         self.has_lobes_under_punctual_lights
     }
@@ -209,9 +209,9 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
 ///
 /// The unit is 2^4 times a typical radiance: the radiance of all surfaces if the emitted power were spread
 /// over them and reflected once by white. A much brighter emitter or environment texel raises the unit, such
-/// that its own radiance is within 2^7 units. Sums of 2^12 samples, the maximum of a pixel, can then hold
-/// 2^15 times the typical radiance, and 2^4 times the brightest radiance on average: shadow rays next to an
-/// emitter can contribute a thousand times as much.
+/// that its own radiance is within 2^7 units. A pixel has at most 2^12 samples, so that their mean can be up
+/// to 2^11 units: 2^15 times the typical radiance, or 2^4 times the brightest. The margin above the brightest
+/// radiance is for shadow rays next to an emitter, which can contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let typical = lights.power() / (std::f64::consts::PI * scene.area().max(f64::MIN_POSITIVE));
     let environment = lights.environment().map_or(0.0, |environment| environment.brightest);

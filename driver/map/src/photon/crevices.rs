@@ -1,6 +1,6 @@
-//! Merges photons of one path that lie close together. A path that is caught between sheets hits them many
-//! times, and a gather there would find only its photons. One photon with the power of several replaces them,
-//! so that a gather also finds those of other paths.
+//! Merges photons of one path that lie close together. A path that is caught between two near surfaces hits
+//! them many times, and a gather there would find only the photons of this path. One photon with their power
+//! replaces them, so that the gather also finds photons of other paths.
 
 use std::f64::consts::PI;
 
@@ -13,8 +13,8 @@ use super::tracer::Traced;
 const SAMPLED: usize = 32;
 /// Rank of the neighbour, from 1, whose distance measures the density.
 const NEIGHBOR: usize = 8;
-/// Fraction of the sampled photons whose density is at least the measured one. It is below 1/2 so that a wide
-/// ground does not dominate.
+/// Fraction of the sampled photons whose density is at least the density that is used for all. It is below
+/// 1/2 so that a wide ground does not dominate.
 const SHARE: f64 = 0.25;
 /// Maximum number of a path's arrivals at one place that contribute power. More arrivals occur only between
 /// sheets that nearly touch, whose light is invisible.

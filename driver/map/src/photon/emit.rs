@@ -1,9 +1,9 @@
 //! Emission: the first ray of a photon path, and its power.
 //!
-//! The first four random numbers of a path, for position and direction, are points of a low-discrepancy
-//! sequence indexed by the path's number (the additive recurrence of Roberts 2018, *The unreasonable
-//! effectiveness of quasirandom sequences*), shifted by the seed. Random numbers of bounces are hashes of
-//! (seed, path, bounce).
+//! The first four random numbers of a path choose its source, position and direction. They are a point of a
+//! low-discrepancy sequence: the additive recurrence of Roberts 2018 (*The unreasonable effectiveness of
+//! quasirandom sequences*), indexed by the path's number and shifted by the seed. Random numbers of bounces
+//! are hashes of (seed, path, bounce).
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -104,8 +104,8 @@ fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
-/// Returns the point by which a path's emission is sampled, warped by the guide if there is one, and its
-/// weight.
+/// Returns the low-discrepancy point from which a path's emission is sampled, and its weight. A guide warps
+/// the point.
 pub(super) fn emission_point(guide: Option<&Guide>, random: PathRandom) -> Warped {
     let point = random.emission();
     guide.map_or(Warped { point, weight: 1.0 }, |guide| guide.warp(point))
@@ -157,8 +157,8 @@ pub(super) fn emit(
     Ok(emission.map(|emission| Emission { power: emission.power * weight, ..emission }))
 }
 
-/// Applies Russian roulette to an emission with less than the mean power, as from dark parts of an emissive
-/// texture, so that photons have equal power.
+/// Applies Russian roulette to an emission below the mean power, for example from dark parts of an emissive
+/// texture. Photons then have equal power.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
     // A probability near 1 counts as 1, because rounding can lower it.
@@ -168,7 +168,7 @@ fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emissi
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// Method by which a photon's direction is chosen: aimed or not.
+/// Method by which a path's first ray is chosen: aimed at targets or not.
 #[derive(Clone, Copy)]
 struct Way<'s> {
     targets: &'s Targets,
@@ -192,7 +192,7 @@ impl Way<'_> {
     }
 }
 
-/// Emission of an emitter, as if it were the only source.
+/// Samples the emission of an emitter, as if it were the only source.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -234,8 +234,8 @@ fn from_emitter(
     })
 }
 
-/// Emission from a point with a radiant intensity, W/sr, that is confined to a cone. The direction is sampled
-/// towards the targets, or in the cone.
+/// Samples the emission of a point light. `intensity` returns its radiant intensity in a direction, W/sr,
+/// which is 0 outside the cone. The direction is sampled towards the targets, or in the cone.
 fn from_point(
     way: Way,
     position: Vec3,
@@ -253,8 +253,8 @@ fn from_point(
     })
 }
 
-/// Cosine-weighted emission of a point on a triangle, per square metre. A double-sided triangle emits from
-/// both sides.
+/// Samples the cosine-weighted emission of a point on a triangle. Its power is per square metre. A
+/// double-sided triangle emits from both sides.
 fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Option<Emission> {
     let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
@@ -271,7 +271,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     })
 }
 
-/// Emission of a point on a triangle towards the targets, per square metre.
+/// Samples the emission of a point on a triangle towards the targets. Its power is per square metre.
 fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f32; 2]) -> Option<Emission> {
     let Aim { towards, measure } = targets.direction(point.position, square)?;
     let cosine = point.normal.dot(towards);
@@ -284,9 +284,9 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light. If
-/// photons are stored in only a part of the scene, rays that miss this part are dropped, whether they are
-/// aimed or not.
+/// Samples light that comes from infinitely far away along `direction`. `irradiance` is that of a surface
+/// facing the light. If photons are stored in only a part of the scene, rays that miss this part are dropped,
+/// whether they are aimed or not.
 fn from_afar(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
     sources: &Sources,
@@ -315,8 +315,8 @@ fn from_afar(
     let Some(emission) = emission.filter(|emission| meets_box(bounds, &emission.ray)) else {
         return Ok(None);
     };
-    // A ray begins outside the scene only if something lies before the box, because the precision of a ray
-    // falls with its length.
+    // A ray begins outside the scene only if something lies in front of the box, because the precision of a
+    // ray falls with its length.
     let origin = emission.ray.origin;
     let is_open = closest_hit(scene, memory, &Ray::new(origin, -direction))?.is_none();
     let origin = if is_open { origin } else { origin - direction * sources.beyond };
@@ -338,8 +338,8 @@ fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     first <= last
 }
 
-/// Emission from infinitely far through the faces of a box. Faces are chosen in proportion to their projected
-/// areas.
+/// Samples light that comes from infinitely far away through the faces of a box. Faces are chosen in
+/// proportion to their projected areas.
 fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let [lower, upper] = bounds;
     let size = upper - lower;

@@ -4,7 +4,7 @@ use photoncard_shared::message::Fault;
 
 use crate::pack::PackError;
 
-/// Error that prevents a photon map.
+/// Error of the photon pass or of the construction of the photon map.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PhotonError {
     /// The photon grid is too coarse for the maximum distance of gathers, because the scene is too wide.

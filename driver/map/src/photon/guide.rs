@@ -1,5 +1,5 @@
-//! Guiding of emission: warps the unit hypercube from which emission is sampled, towards points whose paths
-//! are useful.
+//! Guiding of emission: warps the unit hypercube from which emission is sampled. The density increases at
+//! points whose paths are useful, because they store photons that the picture uses.
 //!
 //! The hypercube is halved repeatedly, each box along the dimension that best separates useful from useless
 //! paths. A point is transformed by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance
@@ -11,12 +11,12 @@ pub(super) const DIMENSIONS: usize = 4;
 /// Point of the hypercube, in units of 2^-64.
 pub(super) type Point = [u64; DIMENSIONS];
 
-/// Fraction of the points that is uniform. Its inverse is an upper bound of the weights.
+/// Fraction of the points that are uniformly distributed. Its inverse is an upper bound of the weights.
 pub(super) const UNIFORM_SHARE: f64 = 0.25;
 /// Minimum number of useful samples per half, on average.
 const MIN_USEFUL: usize = 8;
-/// Number of hypothetical samples, with the mean square use of the enclosing box, that are added to a box's
-/// own samples.
+/// Number of hypothetical samples that are added to a box's own samples. Their mean square use is that of the
+/// enclosing box.
 const PRIOR_SAMPLES: f64 = 4.0;
 /// Maximum number of halvings along a dimension.
 const MAX_HALVINGS: u32 = 20;
@@ -25,8 +25,8 @@ const ALL: f64 = 18_446_744_073_709_551_616.0;
 /// Largest `f64` below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Point of the hypercube from which a path is emitted, and the uses of the path's photons for the picture,
-/// as if the path were not guided.
+/// Point of the hypercube from which a path is emitted, and how much the picture uses the path's photons.
+/// Both use values are those of the same path without guiding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
     pub(super) point: Point,
@@ -39,7 +39,7 @@ pub(super) struct Sample {
     pub(super) weight: f32,
 }
 
-/// A warped point and its weight, the ratio of the densities of uniform and of warped points.
+/// A warped point and its weight: the density of uniform points divided by that of warped points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Warped {
     pub(super) point: Point,
@@ -122,7 +122,7 @@ impl Guide {
         Some(Self { boxes, spread: total, gain: guided_use / (all.uses / all.weight) })
     }
 
-    /// Ratio of the expected uses of a guided and an unguided path, estimated from the samples.
+    /// Expected use of a guided path divided by that of an unguided path, estimated from the samples.
     pub(super) fn gain(&self) -> f64 {
         self.gain
     }
@@ -166,8 +166,8 @@ impl Guide {
 
 /// Boxes of a [`Guide`] during its construction.
 struct Builder {
-    /// Boxes. `share` is the root mean square of the use of the box's paths times its volume, which is the
-    /// optimal density.
+    /// Boxes. The `share` of an undivided box is its volume times the root mean square use of its paths. This
+    /// is proportional to the box's optimal probability.
     boxes: Vec<Region>,
     /// Volume and mean use of each box.
     uses: Vec<(f64, f64)>,
@@ -206,8 +206,8 @@ fn is_upper(sample: &Sample, dimension: usize, halvings: u32) -> bool {
     sample.point[dimension] >> (63 - halvings) & 1 == 1
 }
 
-/// Returns the dimension along which the two halves differ most, such that the sum of their optimal shares is
-/// least; `None` if the box has too few useful samples to be split, or was halved too often.
+/// Returns the dimension in which to split a box: that with the least sum of the optimal shares of the two
+/// halves. Returns `None` if the box has too few useful samples to be split, or was halved too often.
 fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usize> {
     if Sums::of(samples).useful < 2 * MIN_USEFUL {
         return None;
@@ -225,7 +225,7 @@ fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usi
         .map(|(dimension, _)| dimension)
 }
 
-/// Partitions samples into those that fulfil a condition, and the others.
+/// Moves the samples for which `is_first` is true to the front. Returns them and the others.
 fn partitioned(samples: &mut [Sample], is_first: impl Fn(&Sample) -> bool) -> (&mut [Sample], &mut [Sample]) {
     let mut count = 0;
     for index in 0..samples.len() {
@@ -253,7 +253,7 @@ mod tests {
         point.map(|coordinate| coordinate as f64 / ALL)
     }
 
-    /// Use that is concentrated in a corner of three dimensions.
+    /// Use of a path: above 0 only in a corner of three of the dimensions.
     fn use_of(point: Point) -> f64 {
         let [a, b, _, d] = coordinates(point);
         if a < 0.3 && b > 0.6 && d < 0.5 { 1.0 + a } else { 0.0 }

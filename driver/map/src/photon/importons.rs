@@ -1,4 +1,4 @@
-//! Importons: positions at which the picture of a camera uses photons, found by a pilot of eye paths.
+//! Importons: positions at which the picture of a camera uses photons. A pilot pass of eye paths finds them.
 //!
 //! Photons are used where gather rays end and, for caustics, where eye paths end.
 
@@ -22,7 +22,7 @@ const EYE_PATHS: u32 = 128;
 const FEW_EYE_PATHS: u32 = 32;
 /// Number of gather rays per eye path.
 const GATHER_RAYS: u32 = 4;
-/// Seed of the eye paths, unlike usual seeds of photon paths, so that their random numbers differ.
+/// Seed of the eye paths. It differs from usual seeds of photon paths, so that the random numbers differ too.
 const SEED: u32 = 0x1b56_c4e9;
 
 /// Importon: a position, and the weight of its light in the picture.
@@ -36,8 +36,8 @@ struct Importon {
 
 /// Importons of the photon map and of the caustic map.
 pub(crate) struct Importons {
-    /// Importons at the ends of gather rays and of eye paths. The end of an eye path counts as that of one
-    /// gather ray.
+    /// Importons at the ends of gather rays and of eye paths. The end of an eye path counts as much as the
+    /// end of one gather ray.
     pub(crate) indirect: ImportonGrid,
     /// Importons at the ends of eye paths.
     pub(crate) caustic: ImportonGrid,
@@ -53,7 +53,8 @@ impl Importons {
         Self::of(packed, camera, EYE_PATHS, areas)
     }
 
-    /// Finds fewer importons, in grids with the smallest cells that they support.
+    /// Finds the importons of fewer eye paths. The cells of the grids are as small as the number of importons
+    /// allows.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -145,8 +146,8 @@ impl<M: MemoryPort> Walk<'_, M> {
         Ok(())
     }
 
-    /// Surface at which a path ends, and the path's throughput; `None` if the path leaves the scene, is lost
-    /// or is absorbed.
+    /// Follows a path to its end. Returns the surface there and the path's throughput; `None` if the path
+    /// leaves the scene, is lost or is absorbed.
     fn follow(&mut self, ray: Ray, passes: Passes) -> Result<Option<(Surface, Vec3)>, Fault> {
         let mut path = SpecularPath::new(ray, Carried::Radiance, passes);
         let mut surface = Surface::NOWHERE;
@@ -180,8 +181,8 @@ fn importon(surface: &Surface, throughput: Vec3) -> Option<Importon> {
 /// Cell of a grid: its coordinates, and the signed axis nearest to the surface normal.
 type Cell = ([i32; 3], u8);
 
-/// Grid of importon weights. A cell covers an interval of positions and of normal directions, because photons
-/// on the other side of a wall are useless.
+/// Grid of importon weights. A cell covers a cube of positions and the normals nearest to one signed axis,
+/// because photons on the other side of a wall are useless.
 pub(crate) struct ImportonGrid {
     /// Side of a cell, metres.
     side: f32,
@@ -190,12 +191,12 @@ pub(crate) struct ImportonGrid {
 
 /// Minimum mean number of importons per cell that contains surface.
 const MIN_IMPORTONS: f32 = 8.0;
-/// Fraction of the importons beyond each face of the box from which the area of the surface is estimated.
+/// Fraction of the importons that `area` ignores at each end of each axis.
 const OUTLIERS: f32 = 0.02;
 
 impl ImportonGrid {
-    /// Builds a grid of importons. Cells are as wide as the area from which photons are gathered, the
-    /// fraction `share` of the surface.
+    /// Builds a grid of importons. The face of a cell is as large as the area from which photons are
+    /// gathered: the fraction `share` of the surface.
     fn new(importons: &[Importon], share: f32) -> Self {
         let share = share.max(MIN_IMPORTONS / importons.len().max(1) as f32);
         let side = (area(importons) * share).sqrt().max(f32::MIN_POSITIVE);
@@ -207,8 +208,8 @@ impl ImportonGrid {
         grid
     }
 
-    /// Use of a photon of power 1. The variance that a photon adds to the picture's pixels is its squared
-    /// power times the density of importons around it; the use is the square root of that.
+    /// Use of a photon of power 1: the square root of the variance that it adds to the picture's pixels. This
+    /// variance is the squared power times the density of importons around the photon.
     pub(super) fn use_of(&self, photon: &Photon) -> f64 {
         let cell = self.cell(photon.position.into(), photon.normal);
         self.cells.get(&cell).copied().unwrap_or(0.0).sqrt()

@@ -1,7 +1,7 @@
 //! Photon pass: traces paths from the lights and stores photons where they hit surfaces.
 //!
 //! Photons depend only on the scene, the seed and their number, not on threads, tiles or chips. They depend
-//! on the camera only if they are guided towards what it uses.
+//! on the camera only if paths are guided towards surfaces that its picture uses.
 
 mod crevices;
 mod emit;

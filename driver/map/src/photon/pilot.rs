@@ -1,5 +1,5 @@
-//! Pilots: paths with other seeds than those of the photon map. They determine the sources and the guide of
-//! the map's paths.
+//! Pilot passes: photon paths with other seeds than those of the photon map. They determine the sources and
+//! the guide of the map's paths.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub struct Guiding {
     pub pilot_paths: u64,
     /// Number of cells into which the space of emissions is divided.
     pub cells: usize,
-    /// Ratio of the expected uses of a guided and an unguided path with the same aim.
+    /// Expected use of a guided path for the picture, divided by that of an unguided path with the same aim.
     pub gain: f64,
 }
 
@@ -32,11 +32,11 @@ pub struct Guiding {
 const AIM_TASKS: u64 = 4;
 /// Number of tasks, of [`PATHS_PER_TASK`] paths each, of a pilot that measures the share of caustics.
 const SHARE_TASKS: u64 = 8;
-/// Number of lower bits of a grid coordinate that a cell of [`CellPowers`] spans, such that the longest side
-/// of the grid has 32 to 64 cells.
+/// Number of lower bits of a grid coordinate that one cell of [`CellPowers`] comprises. The longest side of
+/// the grid then has 32 to 64 cells.
 const CELL_BITS: u32 = GRID_BITS - 6;
-/// Minimum ratio of the effective numbers of photons of aimed and unaimed paths, at which paths are aimed. It
-/// is 2 so that noise does not decide in rooms, where both are about equal.
+/// Factor by which the effective number of photons of aimed paths must exceed that of unaimed paths for paths
+/// to be aimed. With 2, noise does not decide in rooms, where both numbers are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
 /// Number from which the seed of a pilot round is made: the map's seed XOR `hash(GUIDE_SEED + round)`.
 const GUIDE_SEED: u32 = 0x7feb_352d;
@@ -50,8 +50,8 @@ const MIN_GUIDE_TASKS: u64 = 32;
 /// Maximum number of tasks of a pilot round.
 const MAX_GUIDE_TASKS: u64 = 128;
 
-/// Returns the tracer of the photon map with aimed paths if their effective number of photons is more than
-/// [`MIN_GAIN_BY_AIM`] times that of unaimed paths, else the tracer with unaimed paths.
+/// Returns the tracer of the photon map. Its paths are aimed if their effective number of photons is more
+/// than [`MIN_GAIN_BY_AIM`] times that of unaimed paths.
 pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<Tracer<'_>, Fault> {
     let unaimed = Tracer::new(packed, packed.sources(), seed, Purpose::Indirect);
     let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
@@ -76,9 +76,9 @@ fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Ve
     Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
 }
 
-/// Estimates the fraction of the power arriving at surfaces, over all bounces, that caustics contribute in
-/// the cells of space where they occur. The mean over cells is weighted by the power of caustics; it is 1 if
-/// no other light arrives.
+/// Estimates the fraction of the power arriving at surfaces, over all bounces, that caustics contribute where
+/// they occur. It is the mean of the fractions in cells of space, weighted by the power of caustics. It is 1
+/// if no other light arrives.
 pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
     let power_by = |sources: Option<&Sources>, purpose: Purpose| {
         // The pilot's paths have another seed, so that the number of paths does not depend on the photons of
@@ -116,8 +116,8 @@ impl CellPowers {
         self.0.values().map(|cell| cell.power).sum()
     }
 
-    /// Mean fraction that these powers are of all power in their cells, weighted by these powers. It is at
-    /// least the ratio of the two total powers.
+    /// Mean over cells of the ratio of these powers to all power in the cell, weighted by these powers. It is
+    /// at least the ratio of the two total powers.
     fn share_of(&self, all: &Self) -> f64 {
         let (own, whole) = (self.power(), all.power());
         // Only pairs of different photons count: pairs of a photon with itself would make any light of few

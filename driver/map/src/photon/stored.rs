@@ -24,7 +24,7 @@ const AXIS_SHIFT: u32 = 48;
 const AXIS_MASK: u64 = 3 << AXIS_SHIFT;
 
 impl StoredPhoton {
-    /// Photon at the grid point nearest to its position.
+    /// Encodes a photon and moves it to the nearest grid point.
     pub(crate) fn new(grid: &PhotonGrid, photon: &Photon) -> Self {
         let content = Photon::content(&Photon { axis: 0, ..*photon }.to_bytes());
         Self::at(grid.nearest(photon.position), content)
@@ -58,7 +58,7 @@ impl StoredPhoton {
         self.colour().into_iter().map(f64::from).sum()
     }
 
-    /// Power, in the map's units.
+    /// Power per channel, in the map's units.
     pub(crate) fn colour(self) -> [f32; 3] {
         let [a, b, c, d, ..] = self.content();
         Rgbe([a, b, c, d]).decode()
@@ -85,7 +85,7 @@ impl StoredPhoton {
         normal_class(Photon::normal_of_flags(self.flags()))
     }
 
-    /// Code of the photon's disc: a fraction, or the radius of a kernel in the caustic map.
+    /// Code of the photon's disc fraction or, in the caustic map, of the radius of its kernel.
     pub(crate) fn disc(self) -> u8 {
         Photon::disc_of_flags(self.flags())
     }
@@ -103,7 +103,8 @@ impl StoredPhoton {
         self.with_colour(sum, hash(self.place as u32 ^ hash(other.place as u32)))
     }
 
-    /// The photon with another power, in the map's units. `dither` has the random bits of its rounding.
+    /// The photon with another power per channel, in the map's units. `dither` holds random bits for
+    /// rounding.
     #[must_use]
     pub(crate) fn with_colour(self, colour: Vec3, dither: u32) -> Self {
         let mut content = self.content();
@@ -140,15 +141,15 @@ pub struct Photons {
 }
 
 impl Photons {
-    /// Moves photons to the nearest points of a grid. `power_unit` is the power of a photon of value 1,
-    /// watts.
+    /// Creates photons at the nearest points of a grid. `power_unit` is the power, in watts, that the stored
+    /// value 1 represents.
     pub fn new(grid: PhotonGrid, power_unit: f32, photons: impl IntoIterator<Item = Photon>) -> Self {
         let list = photons.into_iter().map(|photon| StoredPhoton::new(&grid, &photon)).collect();
         Self { list, grid, power_unit }
     }
 
-    /// Replaces the first photons, the fraction `share` of all, by those of `others`. Paths are numbered and
-    /// independent, so that this equals tracing the paths with the first numbers anew.
+    /// Replaces the first photons, the fraction `share` of all, by the first photons of `others`. Paths are
+    /// numbered and independent, so that the result is the same as if the first paths were traced anew.
     #[must_use]
     pub fn with_replaced(&self, others: &Self, share: f64) -> Self {
         let count = ((share * self.len() as f64) as usize).min(self.len()).min(others.len());
@@ -171,7 +172,7 @@ impl Photons {
         self.grid
     }
 
-    /// Power of a photon of value 1, watts.
+    /// Power, in watts, that the stored value 1 represents.
     pub fn power_unit(&self) -> f32 {
         self.power_unit
     }

@@ -16,24 +16,25 @@ use crate::pack::PackedScene;
 
 /// Result of the photon pass.
 pub struct PhotonPass {
-    /// As many photons as requested, in the order of their paths.
+    /// Photons in the order of their paths, at most as many as requested.
     pub photons: Photons,
     /// Number of paths traced.
     pub paths: u64,
-    /// Guiding of the paths towards what a camera uses; `None` if paths are not guided.
+    /// Statistics of the guiding of paths towards surfaces that a camera's picture uses; `None` if paths are
+    /// not guided.
     pub guiding: Option<Guiding>,
 }
 
-/// Number of paths after which at least one photon per thousand further paths must be stored.
+/// Number of paths after which the pass ends unless each thousand further paths store at least one photon.
 const FRUITLESS_PATHS: u64 = 1_000_000;
-/// Number of paths per caustic photon that are traced in any case.
+/// Number of paths by which each stored caustic photon raises the limit on paths.
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 /// Maximum number of paths for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon.
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
 /// Minimum number of paths for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
-/// Share of the arriving power, where caustics occur, at which they get all [`MAX_PATHS_TO_CAUSTICS`]
-/// additional paths. A smaller share gets proportionally fewer, but at least [`MIN_PATHS_TO_CAUSTICS`].
+/// Fraction of the arriving power (`caustic_share`) from which caustics get all [`MAX_PATHS_TO_CAUSTICS`]
+/// additional paths. A smaller fraction gets proportionally fewer, but at least [`MIN_PATHS_TO_CAUSTICS`].
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
 /// Traces paths until `count` photons are stored. It stores none if no surface stores photons, and fewer if
@@ -41,7 +42,7 @@ const FULL_CAUSTIC_SHARE: f64 = 0.1;
 /// of photons and returns whether to continue.
 ///
 /// # Errors
-/// If `progress` returns false.
+/// If `progress` returns false, or the packed scene is malformed.
 pub fn trace(
     packed: &PackedScene,
     seed: u32,
@@ -51,7 +52,7 @@ pub fn trace(
     trace_for(packed, None, seed, count, progress)
 }
 
-/// Does [`trace`] with paths that are guided towards importons, if there are any.
+/// Traces as [`trace`] does, with paths that are guided towards importons if there are any.
 pub(crate) fn trace_for(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -74,13 +75,13 @@ pub(crate) fn trace_for(
     Ok(traced)
 }
 
-/// Traces paths until `count` caustic photons are stored or a limit on paths is reached. The limit is 125,000
-/// paths, and twenty more for each stored photon. Once it is reached, a pilot measures the share of light
-/// that caustics contribute, and 125,000 is replaced by a number in proportion to it, from 125,000 to a
-/// million. `go_on` returns whether to continue.
+/// Traces paths until `count` caustic photons are stored or a limit on paths is reached. The limit is first
+/// 125,000 paths, and twenty more for each stored photon. Once it is reached, a pilot pass measures the share
+/// of light that caustics contribute. The 125,000 is then replaced by a number in proportion to this share,
+/// from 125,000 to a million. `go_on` returns whether to continue.
 ///
 /// # Errors
-/// If `go_on` returns false.
+/// If `go_on` returns false, or the packed scene is malformed.
 pub fn trace_caustics(
     packed: &PackedScene,
     seed: u32,
@@ -90,7 +91,7 @@ pub fn trace_caustics(
     trace_caustics_for(packed, None, seed, count, go_on)
 }
 
-/// Does [`trace_caustics`] with paths that are guided towards importons, if there are any.
+/// Traces as [`trace_caustics`] does, with paths that are guided towards importons if there are any.
 pub(crate) fn trace_caustics_for(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -113,15 +114,15 @@ pub(crate) fn trace_caustics_for(
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Number of paths for caustics that contribute the fraction `share` of the light, in addition to those in
-/// proportion to their photons.
+/// Number of paths allowed for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon. `share`
+/// is the fraction of the light that caustics contribute.
 fn paths_worth(share: f64) -> u64 {
     let full = (share / FULL_CAUSTIC_SHARE).min(1.0);
     MIN_PATHS_TO_CAUSTICS.max((full * MAX_PATHS_TO_CAUSTICS) as u64)
 }
 
-/// Traces paths until `count` photons are stored or `further(photons, paths)`, the number of further paths
-/// allowed, is 0.
+/// Traces paths until `count` photons are stored or no further path is allowed. `further(photons, paths)`
+/// returns the number of further paths allowed.
 fn trace_while(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -181,8 +182,8 @@ fn trace_while(
     Ok(PhotonPass { photons, paths, guiding })
 }
 
-/// Tracer of the photons of a map. Its paths start at the most useful sources. `towards` are importons, with
-/// sources that are aimed at them.
+/// Creates the tracer of a map. Its paths start at those sources whose photons are most useful. `towards`
+/// holds importons and the sources that are aimed at them.
 fn tracer<'s>(
     packed: &'s PackedScene,
     (seed, purpose): (u32, Purpose),
@@ -197,8 +198,8 @@ fn tracer<'s>(
     more_useful([tracer, Tracer::new(packed, aimed, seed, purpose)], packed, importons)
 }
 
-/// Number of tasks of the next round, from the photons per path so far. It is at most 64, so that progress is
-/// reported. It does not affect which paths are traced.
+/// Number of tasks of the next round, estimated from the number of photons per path so far. It is at most 64,
+/// so that progress is reported. It does not affect which paths are traced.
 fn next_tasks(missing: usize, stored: usize, paths: u64) -> u64 {
     let photons_per_path = if stored > 0 { stored as f64 / paths as f64 } else { 4.0 };
     let needed = (missing as f64 / photons_per_path) as u64;

@@ -54,7 +54,7 @@ pub(super) struct Tracer<'s> {
     sources: &'s Sources,
     pub(super) guide: Option<&'s Guide>,
     pub(super) grid: PhotonGrid,
-    /// Power of a photon of value 1, watts, if its path were the only one.
+    /// Power, in watts, that the stored value 1 represents if a photon's path is the only one.
     pub(super) path_unit: f32,
     pub(super) seed: u32,
     purpose: Purpose,
@@ -62,8 +62,8 @@ pub(super) struct Tracer<'s> {
 
 impl<'s> Tracer<'s> {
     pub(super) fn new(packed: &'s PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
-        // Photons rarely gain power after emission: by a factor of 2 at a Phong lobe, and of 16 at glass
-        // whose reflection is almost only that of a mirror.
+        // Photons rarely gain power after emission. The exceptions are Phong lobes, by a factor of 2, and
+        // glass whose reflection is almost only that of a mirror, by a factor of 16.
         let path_unit = power_of_two_above(sources.strongest.into());
         let (scene, grid) = (packed.view().0, packed.photon_grid());
         Self { packed, scene, sources, guide: None, grid, path_unit, seed, purpose }
@@ -74,7 +74,8 @@ impl<'s> Tracer<'s> {
         Self { seed, ..*self }
     }
 
-    /// Tracer of guided paths, whose photons can be stronger.
+    /// Tracer whose paths are guided, if `guide` is given. Its power unit is then larger, because photons can
+    /// be stronger.
     pub(super) fn guided(self, guide: Option<&'s Guide>) -> Self {
         let scale = if guide.is_some() { power_of_two_above(1.0 / UNIFORM_SHARE) } else { 1.0 };
         Self { guide, path_unit: self.path_unit * scale, ..self }
@@ -158,8 +159,8 @@ impl<'s> Tracer<'s> {
         Ok(())
     }
 
-    /// Record of a photon that arrives at a surface. Its power is divided by the surface's layer probability
-    /// and coverage, because photons and gathers reach the base with that probability only.
+    /// Encodes a photon that arrives at a surface. Its power is divided by the product of the surface's layer
+    /// probability and coverage, because photons and gathers reach the base layer only with this probability.
     fn stored(&self, surface: &Surface, arrived: Vec3, direct: bool, dither: u32) -> StoredPhoton {
         let power = arrived / (surface.probability * surface.coverage);
         let photon = Photon {
@@ -175,8 +176,8 @@ impl<'s> Tracer<'s> {
     }
 }
 
-/// Returns whether a surface needs photons of a light. A narrow lobe needs them only of lights without
-/// extent, which its rays cannot hit.
+/// Returns whether a surface needs photons of a light. A narrow lobe needs only photons of lights without
+/// extent, because rays of the lobe cannot hit these lights.
 fn is_lit(surface: &Surface, has_extent: bool) -> bool {
     let reflection = surface.reflection;
     !if has_extent { reflection.without_narrow_lobe() } else { reflection }.is_black()
@@ -198,8 +199,8 @@ fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     if share < MAX_SHADING_SHARE { share } else { MAX_SHADING_SHARE }
 }
 
-/// Applies Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest
-/// channel. Its power is then divided by that probability.
+/// Applies Russian roulette: a photon survives with the probability `min(1, max(reflected) / max(arrived))`
+/// over the channels. Its power is then divided by this probability.
 fn survive(arrived: Vec3, reflected: Vec3, roulette: f32) -> Option<Vec3> {
     let probability = (reflected.max_element() / arrived.max_element()).min(1.0);
     (roulette < probability).then(|| reflected / probability)

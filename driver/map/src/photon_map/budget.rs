@@ -79,7 +79,7 @@ fn is_most(part: u64, all: u64) -> bool {
     part > all / 2
 }
 
-/// Remedy if photons do not fit. It names textures too if texels take most of the card image.
+/// Text that suggests how photons can fit. It names textures too if texels take most of the card image.
 fn lower(photons: &str, texels: u64, needed: u64) -> String {
     let textures =
         if is_most(texels, needed) { ", use smaller textures (`LoadSettings::texture_limit`)" } else { "" };
@@ -88,7 +88,7 @@ fn lower(photons: &str, texels: u64, needed: u64) -> String {
     )
 }
 
-/// Remedy if the scene is too large without photons.
+/// Text that suggests how a scene can fit that is too large even without photons.
 fn simplify(scene: u64, texels: u64) -> String {
     let part = if is_most(texels, scene) {
         format!(

@@ -2,9 +2,9 @@
 //! estimate for a white diffuser is computed at every photon and stored in the card image. A gather then
 //! takes the irradiance of the nearest point on its surface.
 //!
-//! At a photon the density estimate is too high by one photon, the photon itself. On the other hand, no
-//! photon lies between a given position and the point nearest to it, which lowers the estimate at that point
-//! by one photon. For photons in random positions the two errors cancel on average.
+//! At a photon the density estimate is too high by one photon, the photon itself. On the other hand, a gather
+//! uses the point nearest to its position, so that no photon lies between the two. This lowers the estimate
+//! at that point by one photon. For photons in random positions the two errors cancel on average.
 
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;

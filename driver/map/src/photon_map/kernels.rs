@@ -1,9 +1,10 @@
-//! Kernel radii of caustic photons, from the density of the light that each photon belongs to.
+//! Kernel radii of caustic photons. Each radius follows from the density of the photons that come from the
+//! same light.
 //!
-//! Photons of one light have similar directions. Photons that a ball scatters over a room are few and lie
-//! among the many photons of a patch of sunlight. The radius of a photon is the distance within which a given
-//! number of photons lie on its surface with about its direction, so that single photons of a sparse light
-//! are not visible, and a dense light is not blurred.
+//! Photons of one light have similar directions. The few photons that a glass ball scatters over a room can
+//! lie among the many photons of a patch of sunlight. The radius of a photon is the distance within which a
+//! given number of photons lie on its surface with about its direction. Single photons of a sparse light are
+//! then not visible, and a dense light is not blurred.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
@@ -22,8 +23,8 @@ const AREA: f32 = 4.0 / 3.0;
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;
-/// Factor by which a disc's area is multiplied before its code rounds it up to a power of two, so that the
-/// code is that of the nearest power by ratio.
+/// Factor that is applied to a disc's area before its encoding rounds it up to a power of two. The result is
+/// the power of two that is nearest by ratio.
 const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Number of cells added to the radius of a photon's disc, for rounding of positions.
 const MARGIN_CELLS: u32 = 2;

@@ -1,14 +1,14 @@
-//! Line layout of the photon map: leaves of one line each, below inner nodes with up to sixteen children, one
-//! line each.
+//! Line layout of the photon map: leaves with photons, below inner nodes with up to sixteen children. Each
+//! leaf and each inner node is one line of card memory.
 //!
 //! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing
-//! considered harmful*), such that a search is unlikely to visit both sides: the probability that a search
-//! visits a box is proportional to its volume, enlarged by the search radius. Splits are rounded to whole
-//! leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest expected
-//! visits, by the same probabilities.
+//! considered harmful*), so that a search rarely visits both sides. It assumes that the probability of a
+//! visit of a box is proportional to the volume of the box enlarged by the search radius. Splits are rounded
+//! to whole leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest
+//! expected visits, by the same probabilities.
 //!
-//! In a caustic map photons are grouped by the classes of their normals and by the sizes of their discs
-//! before they are split in space, so that a search skips the groups of other surfaces, and no large disc
+//! In a caustic map photons are first grouped by the classes of their normals and by the sizes of their
+//! discs, and then split in space. A search thus skips the groups of other surfaces, and no large disc
 //! enlarges the box of small ones.
 
 use std::num::NonZeroU8;
@@ -108,8 +108,8 @@ struct Searches<'r> {
     reach: Option<Reach<'r>>,
 }
 
-/// Group of a caustic photon: the class of its normal, and that of its disc. Areas in a group differ by a
-/// factor of at most two.
+/// Group of a caustic photon: the class of its normal, and that of its disc. Disc areas in a group differ by
+/// a factor of at most two.
 fn group(photon: &StoredPhoton) -> (u32, u8) {
     (photon.normal_class(), photon.disc() / 2)
 }
@@ -146,7 +146,8 @@ fn join(mut parts: Vec<Tree<Run, Extent>>) -> Option<Tree<Run, Extent>> {
     Some(Tree::node(parts, both, both.chance(0.0) as f32, None))
 }
 
-/// Builds the tree of the photons with the indices from `first` on. `None` without photons.
+/// Builds the tree of `photons`. The first of them has the index `first` in the order of all photons. `None`
+/// without photons.
 fn build(
     photons: &mut [StoredPhoton],
     first: u32,

@@ -98,7 +98,7 @@ pub struct TracedPhotons {
     pub(crate) guiding: Option<Guiding>,
     /// Caustic photons; `None` if none were requested or found.
     pub(crate) caustic: Option<Photons>,
-    /// Importons of the camera for which the photons are; `None` for any camera.
+    /// Importons of the camera for which the photons are traced; `None` if they are for any camera.
     pub(crate) importons: Option<Importons>,
 }
 
@@ -135,8 +135,8 @@ impl TracedPhotons {
     }
 }
 
-/// Adds the photon map to the card image of a packed scene whose photons were traced, as [`map_photons`]
-/// does.
+/// Adds the photon map to the card image of a packed scene, from photons that were traced before.
+/// [`map_photons`] does both steps.
 pub fn map_traced(
     packed: PackedScene,
     traced: TracedPhotons,

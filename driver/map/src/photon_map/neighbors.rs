@@ -13,8 +13,8 @@ const MIN_DIRECTION_COSINE: f32 = 0.8;
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Number of photons in a leaf of [`Places`].
 pub(super) const LEAF: usize = 12;
-/// A photon reuses the distance `d` of a like photon in its leaf if they are at most this fraction of `d`
-/// apart.
+/// Maximum distance between two photons of one leaf, surface and light at which they share the distance `d`
+/// of a neighbour, divided by `d`.
 const SHARED_SHARE: f32 = 0.3;
 
 /// Position of a photon, cells of the photon grid, and the unit vectors by which neighbours are compared.
@@ -61,9 +61,9 @@ impl Bounds {
     }
 }
 
-/// Sorts photons into the order of the kd-tree [`Places`]: photons are split across the longest side of their
-/// box into two runs of whole leaves, and so on down to single leaves. Only the last leaf may have fewer than
-/// [`LEAF`] photons.
+/// Sorts photons into the order of the kd-tree [`Places`]. Photons are split across the longest side of their
+/// box into two runs of whole leaves, and runs are split again down to single leaves. Only the last leaf may
+/// have fewer than [`LEAF`] photons.
 pub(super) fn arrange(photons: &mut [StoredPhoton]) {
     let leaves = photons.len().div_ceil(LEAF);
     if leaves < 2 {
@@ -104,9 +104,9 @@ impl Places {
         self.places[first].is_like(&self.places[second])
     }
 
-    /// Returns each photon's distance to its neighbour number `number`, counted from 1, among photons of its
-    /// surface and light, cells; `limit` if there are fewer within it. A photon can reuse the distance of a
-    /// nearby one ([`SHARED_SHARE`]).
+    /// Returns, for each photon, the distance of its nearest neighbour number `number`, counted from 1, on
+    /// its surface and of its light, cells. It is `limit` if there are fewer neighbours within it. A photon
+    /// can reuse the distance of a nearby photon ([`SHARED_SHARE`]).
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
         let leaves = self.places.par_chunks(LEAF).enumerate();
         leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
@@ -130,8 +130,8 @@ impl Places {
         distances
     }
 
-    /// Distance of one photon's neighbour number `number`, counted from 1, among photons of its surface and
-    /// light; `limit` if there are fewer within it.
+    /// Distance of one photon's nearest neighbour number `number`, counted from 1, on its surface and of its
+    /// light; `limit` if there are fewer neighbours within it.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let nearest = self.nearest(index, number, limit);
         nearest.get(number - 1).map_or(limit, |(squared, _)| squared.sqrt())
@@ -142,8 +142,8 @@ impl Places {
     pub(super) fn nearest(&self, index: usize, number: usize, limit: f32) -> Vec<(f32, usize)> {
         let own = &self.places[index];
         let mut limit = limit * limit;
-        // The least squared distances found, with the photons' indices, and the greatest of them on top. The
-        // bits of positive floats are ordered as the floats.
+        // Heap of the smallest squared distances found, with the photons' indices. The greatest is on top.
+        // The bits of positive floats are ordered as the floats.
         let mut nearest = BinaryHeap::with_capacity(number);
         // Stack of boxes to visit: the squared distance, level and index of each.
         let mut waiting = vec![(0.0, self.levels.len() - 1, 0)];

@@ -1,9 +1,9 @@
 //! Spreads the power of photons that are much stronger than their neighbours.
 //!
-//! The paths of a map for a camera differ in power. A path that the guide takes for useless is rare, and its
-//! photons can have hundreds of times the power of the photons around them, which causes a bright spot of the
-//! size of a gather. The excess is distributed over so many neighbours that none of them becomes much
-//! brighter. The sum of all powers does not change.
+//! The paths of a map for a camera differ in power. The guide rarely samples a path that it estimates to be
+//! useless. The photons of such a path can have hundreds of times the power of the photons around them. They
+//! cause a bright spot of the size of a gather. The excess is distributed over so many neighbours that none
+//! of them becomes much brighter. The sum of all powers does not change.
 
 use glam::{DVec3, Vec3};
 use photoncard_firmware::memory::Lines;

@@ -8,14 +8,13 @@ use crate::photon::{Photons, StoredPhoton};
 const SAMPLED_PHOTONS: usize = 64;
 /// Minimum number of photons in the subset that [`typical_radius`] searches, unless there are fewer photons.
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
-/// Minimum number of neighbours within the subset, unless the subset has at least `1 / MIN_STEP` of the
-/// photons.
+/// Minimum number of neighbours within the subset if its photons are more than `MIN_STEP` indices apart.
 const MIN_NEIGHBORS: usize = 4;
-/// Inverse of the fraction of the photons that is enough for the subset, however few neighbours it contains.
+/// Distance between the indices of the subset's photons up to which any number of neighbours is enough.
 const MIN_STEP: usize = 32;
 
 /// Radius of a typical search for `neighbors` photons, in cells of the photon grid. There is no tree to
-/// search yet, so that the radius is estimated in a subset of the photons, for a proportionally smaller
+/// search yet. The radius is therefore estimated in a subset of the photons, for a proportionally smaller
 /// number of neighbours.
 pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = photons.stored();

@@ -12,7 +12,7 @@ use crate::pack::CardImage;
 pub struct PhotonMapSize {
     /// Number of photons in the map: `N_PM` of Table 7.1 of the dissertation.
     pub photons: u64,
-    /// Size of the photons and their tree, whole lines, bytes.
+    /// Size of the lines that hold the photons and their tree, bytes.
     pub bytes: u64,
 }
 

@@ -39,8 +39,8 @@ pub fn store_photons(
     Ok(image.finish())
 }
 
-/// Adds a caustic map to a card image. The radius codes of `photons` must be set already; the greatest
-/// possible code is that of the radius `greatest`, metres.
+/// Adds a caustic map to a card image. The radius codes of `photons` must be set already. The greatest
+/// possible code stands for the radius `greatest`, metres.
 ///
 /// # Errors
 /// As [`store_photons`].

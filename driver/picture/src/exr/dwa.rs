@@ -1,8 +1,8 @@
-//! Checks the sizes that blocks with DWA compression state (`OpenEXR`, "DWAA and DWAB compression") before
-//! they are decoded.
+//! Checks the sizes stated in blocks with DWA compression (`OpenEXR`, "DWAA and DWAB compression") before the
+//! blocks are decoded.
 //!
-//! The `exr` crate allocates as much as a block states. A few bytes could therefore end the process, because
-//! a failed allocation aborts and cannot be caught like a panic.
+//! The `exr` crate allocates as much memory as a block states. A few bytes could therefore end the process: a
+//! failed allocation aborts it and, unlike a panic, cannot be caught.
 
 use std::io::Cursor;
 
@@ -34,7 +34,7 @@ pub(super) fn transform_bytes(header: &Header) -> u64 {
     width.saturating_mul(height).saturating_mul(3 * size_of::<f32>() as u64)
 }
 
-/// Returns whether the sizes that the blocks of a file with DWA compression state are possible.
+/// Returns whether all sizes stated in a file's blocks with DWA compression are possible.
 pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
     let reader = exr::block::read(Cursor::new(bytes), false)?;
     let headers = reader.headers().to_vec();

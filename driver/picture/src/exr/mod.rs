@@ -3,9 +3,9 @@
 //! A file has one part. Radiance is in the unnamed layer, in the channels `R G B`, which every viewer shows.
 //! Layers are in channels such as `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The
 //! data window is the film's crop window, the display window the full picture. The picture's provenance is
-//! JSON in the single attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so that several
-//! would change the file's bytes from run to run. The standard attribute `comments` contains the file's
-//! checksum, by which [`is_intact`] recognises a truncated or damaged file.
+//! JSON in the attribute `photoncard`. It is a single attribute, because the `exr` crate keeps attributes in
+//! a hash map: several would change the file's bytes from run to run. The standard attribute `comments`
+//! contains the file's checksum, by which [`is_intact`] recognises a truncated or damaged file.
 
 mod dwa;
 
@@ -254,8 +254,8 @@ fn to_half(value: f32) -> f16 {
     if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
 }
 
-/// Escapes every character beyond ASCII as `\u` in JSON, where only strings contain such characters. The
-/// attribute is ASCII.
+/// Escapes every character beyond ASCII of a JSON text as `\u`, because the attribute is ASCII. In JSON only
+/// strings contain such characters.
 pub(crate) fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -320,7 +320,8 @@ pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
 }
 
-/// Reads the rendered radiance like [`read()`], from the bytes of a file, with at most `most_pixels` pixels.
+/// Decodes the rendered radiance from the bytes of a file, as [`read()`] does. A picture with more than
+/// `most_pixels` pixels is refused. `path` is the file's name in errors.
 pub fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
     decode_walled(path, bytes, most_pixels, Shown::Rendered)
 }

@@ -2,20 +2,20 @@
 
 use super::{Machine, Symbols};
 
-/// Method by which data reach all chips.
+/// Method by which data get from the host to all chips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Distribution {
-    /// The host sends the data to each chip separately, so that the data pass the host's link once per chip.
+    /// The host sends the data to each chip separately. The data pass the host's link once per chip.
     Separate,
-    /// The data pass a tree of switches between host and chips (dissertation, figure 7.1). They pass the
-    /// host's link once. Each switch forwards a frame to all its links as soon as it has received it, at the
-    /// speed of the host's link.
+    /// The data pass a tree of switches between host and chips (dissertation, figure 7.1), and the host's
+    /// link only once. Each switch forwards a frame to all its links as soon as it has received the whole
+    /// frame, at the speed of the host's link.
     Tree,
 }
 
 impl Distribution {
-    /// Number of levels of switches with the fan-out `f` between the host and `N = chips` chips,
-    /// `ceil(log_f N)`; 0 for one chip.
+    /// Number of levels of switches between the host and `N = chips` chips: `ceil(log_f N)` with the fan-out
+    /// `f`; 0 for one chip.
     pub fn levels(chips: u64, symbols: &Symbols) -> u32 {
         let mut reached = 1.0;
         let mut levels = 0;
@@ -26,8 +26,8 @@ impl Distribution {
         levels
     }
 
-    /// Seconds until all `N = chips` chips have received `I = bytes` bytes over a link of `B` bytes/s:
-    /// `N I / B` separately, `I / B + ceil(log_f N) S_F / B` by a tree; 0 without data.
+    /// Seconds until all `N = chips` chips have received `I = bytes` bytes over a link of `B` bytes/s. It is
+    /// `N I / B` separately, and `I / B + ceil(log_f N) S_F / B` by a tree; 0 without data.
     pub fn seconds(self, bytes: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         match self {
             _ if bytes <= 0.0 => 0.0,
@@ -45,7 +45,7 @@ impl Distribution {
         }
     }
 
-    /// Delay of the last byte by all levels of switches, as the number of bytes sent over the link meanwhile.
+    /// Delay by all levels of switches, as the number of bytes that the host's link transfers meanwhile.
     fn delayed(chips: u64, symbols: &Symbols) -> f64 {
         f64::from(Self::levels(chips, symbols)) * symbols.frame_bytes
     }

@@ -2,10 +2,10 @@
 //! chips that they need.
 //!
 //! [`Symbols`] are the parameters of Table 7.1. A [`Workload`] counts the rays, gathers and bytes of one
-//! frame. A [`Cost`] is the FLOPs and bytes that they need in each unit of the chip, and a [`Prediction`] is
-//! the speed of a [`Machine`] at that cost. [`Flops`] are the operations of a run's counters by the constants
-//! of Table 7.1; [`arithmetic`] counts the operations of this firmware. A [`Distribution`] gives the time of
-//! an upload to all chips. `docs/scaling.md` has the formulas.
+//! frame. A [`Cost`] is the number of FLOPs and DRAM bytes of this work in each unit of the chip. A
+//! [`Prediction`] is the speed of a [`Machine`] at such a cost. [`Flops`] are the operations of a measured
+//! run by the constants of Table 7.1; [`arithmetic`] counts those of this firmware. A [`Distribution`] gives
+//! the time of an upload to all chips. `docs/scaling.md` has the formulas.
 
 pub mod arithmetic;
 mod distribution;
@@ -24,7 +24,7 @@ use serde::Serialize;
 
 use self::arithmetic::{Arithmetic, ChipPart};
 
-/// Number of colour channels. A reflection function is evaluated for each.
+/// Number of colour channels. The reflection function is evaluated once per channel.
 const CHANNELS: f64 = 3.0;
 
 /// Cost of one frame in one unit of the chip, summed over all chips.
@@ -41,16 +41,17 @@ pub struct UnitCost {
 pub struct Cost {
     /// Cost of all rays in the ray caster.
     pub ray_caster: UnitCost,
-    /// Cost of importance tables and the irradiance cache in the controller. They are on chip and take no
+    /// Cost of importance tables and the irradiance cache in the controller. Both are on the chip and read no
     /// DRAM.
     pub controller: UnitCost,
-    /// Cost of photon searches, including those for tables, and of all reflection in the photon gather unit.
+    /// Cost of the photon gather unit: photon searches, including those for importance tables, and all
+    /// reflection.
     pub gather_unit: UnitCost,
 }
 
 impl Cost {
-    /// Cost if reflection is evaluated in two stages: the first once at the end of a gather ray, the second
-    /// for each photon.
+    /// Cost if reflection functions are evaluated in two stages. The first stage is evaluated once at the end
+    /// of a gather ray, the second for each photon.
     pub fn new(workload: &Workload, symbols: &Symbols) -> Self {
         let [stage_1, stage_2] = [symbols.reflection_stage_1, symbols.reflection_stage_2];
         let of_gather = stage_1 + workload.photons_per_gather * stage_2;
@@ -67,16 +68,16 @@ impl Cost {
     /// For [`Workload::naive`] this is
     /// `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 + C_B2)]` FLOPs per frame,
     /// which gives the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own formula is not in the
-    /// public excerpts: this one is a hypothesis that meets the figure.
+    /// public excerpts: this formula is a hypothesis that gives the published number.
     pub fn naive(workload: &Workload, symbols: &Symbols) -> Self {
         let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
         let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
         Self::of_units(workload, symbols, reflection)
     }
 
-    /// Cost by counted arithmetic. The ray caster intersects boxes and triangles and evaluates surfaces, the
-    /// gather unit searches for photons and computes all reflection, and the controller computes directions,
-    /// irradiance cache and pixels.
+    /// Cost by counted arithmetic instead of the constants of Table 7.1. The ray caster intersects boxes and
+    /// triangles and evaluates surfaces. The gather unit searches for photons and computes all reflection.
+    /// The controller computes directions, irradiance cache and pixels.
     pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         Self {
@@ -89,7 +90,7 @@ impl Cost {
         }
     }
 
-    /// Cost without the controller. `reflection` is the FLOPs of all reflection functions, for one channel.
+    /// Cost of ray caster and gather unit. `reflection` is the FLOPs of all reflection functions per channel.
     fn of_units(workload: &Workload, symbols: &Symbols, reflection: f64) -> Self {
         Self {
             ray_caster: UnitCost {
@@ -104,7 +105,7 @@ impl Cost {
         }
     }
 
-    /// Sum over the units.
+    /// Sum of the costs of all units.
     pub fn total(&self) -> UnitCost {
         let units = [self.ray_caster, self.controller, self.gather_unit];
         UnitCost {
@@ -114,13 +115,13 @@ impl Cost {
     }
 }
 
-/// Number of rays whose light is reflected at the point seen by the eye ray: gather and shadow rays.
+/// Number of gather and shadow rays. Their light is reflected at the point that an eye ray hits.
 fn reflected_rays(workload: &Workload) -> f64 {
     workload.gather_rays + workload.shadow_rays
 }
 
-/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts;
-/// terms and FLOPs are those of this project.
+/// FLOPs of importance tables and irradiance cache. The formula and its constants are those of this project,
+/// because the public excerpts of the dissertation do not contain its formula.
 fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
     let interpolation = symbols.records_per_pixel * symbols.interpolation;
@@ -128,7 +129,7 @@ fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     workload.table_gathers * table + workload.interpolated_samples * interpolation + workload.records * record
 }
 
-/// Floating-point operations of each unit of the chip, summed over all chips, by the constants of Table 7.1.
+/// Floating-point operations of each unit of the chip by the constants of Table 7.1, summed over all chips.
 /// [`Arithmetic`] has the operations of this firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flops {
@@ -141,8 +142,8 @@ pub struct Flops {
 }
 
 impl Flops {
-    /// Operations of the work in `counters`, by the constants of Table 7.1. `gather_rays` is the number of
-    /// gather rays per sample.
+    /// Operations of the work that `counters` count, by the constants of Table 7.1. `gather_rays` is the
+    /// number of gather rays per sample.
     pub fn by_table(counters: &Counters, gather_rays: u32) -> Self {
         let symbols = Symbols { gather_rays: f64::from(gather_rays), ..Symbols::NOMINAL };
         let cost = Cost::new(&Workload::counted(counters), &symbols);

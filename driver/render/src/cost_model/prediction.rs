@@ -1,5 +1,5 @@
-//! Predicts the speed of a machine from the cost of a frame: tiles and frames per second, and the chips
-//! needed for a frame rate.
+//! Predicts the speed of a machine from the cost of a frame: tiles and frames per second, and the number of
+//! chips needed for a frame rate.
 
 use std::fmt;
 
@@ -21,12 +21,12 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Chip that section 7.1 expects for 2010: 90 GB/s and 500 GFLOPS. Other values are this project's
-    /// choices: a link of 4 GB/s in each direction, the sixteen lanes of PCI Express 1.x in a workstation of
-    /// 2007; a latency of 100 ns, typical of DRAM of any year; and 128 tasks.
+    /// Chip that section 7.1 of the dissertation expects for 2010: 90 GB/s and 500 GFLOPS. The other values
+    /// are choices of this project: a link of 4 GB/s in each direction, the sixteen lanes of PCI Express 1.x
+    /// in a workstation of 2007; a latency of 100 ns, typical of DRAM of any year; and 128 tasks.
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9, latency: 100e-9, tasks: 128 };
 
-    /// Latency of a read in nanoseconds, rounded to a thousandth.
+    /// Latency of a read in nanoseconds, rounded to a multiple of 0.001.
     pub fn latency_ns(&self) -> f64 {
         (self.latency * 1e12).round() / 1e3
     }
@@ -46,7 +46,7 @@ pub enum Resource {
     Bandwidth,
     /// Arithmetic of the chips.
     Computation,
-    /// Bandwidth of the host's link, which more chips do not increase.
+    /// Bandwidth of the host's link. More chips do not increase it.
     HostLink,
 }
 
@@ -65,7 +65,7 @@ pub struct ChipsNeeded {
 /// Upper bound of the speed at which a machine renders frames of a given cost.
 ///
 /// Memory, arithmetic and link are assumed to work simultaneously, as in a pipeline without stalls, and tiles
-/// to be distributed without loss. The rate of a resource that a frame does not use is infinite.
+/// to be distributed over the chips without loss. If a frame does not use a resource, its rate is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Tiles per second that one chip's memory bandwidth allows.
@@ -78,14 +78,14 @@ pub struct Prediction {
     pub tiles: f64,
 }
 
-/// Maximum relative difference of rates that is attributed to rounding.
+/// Maximum relative difference between two rates that counts as a rounding error.
 const ROUNDING: f64 = 1e-9;
 
 impl Prediction {
     /// Prediction for a frame with the workload `workload` and the cost `cost`.
     pub fn new(workload: &Workload, cost: &Cost, machine: &Machine) -> Self {
         let total = cost.total();
-        // The link's directions do not disturb each other: the busier one limits.
+        // The two directions of the link are independent, so that the busier one is the limit.
         let link_bytes = workload.bytes_to_host.max(workload.bytes_from_host);
         let rate = |capacity: f64, of_frame: f64| {
             if of_frame > 0.0 { capacity / of_frame } else { f64::INFINITY }
@@ -108,8 +108,8 @@ impl Prediction {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// Resource that limits the frame rate of `chips` chips. If limits are equal, those of the chips take
-    /// precedence over that of the link, because more chips would help, and bandwidth over arithmetic.
+    /// Resource that limits the frame rate of `chips` chips. Of equal limits, that of the DRAM comes first,
+    /// then that of the arithmetic, then that of the link.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink
@@ -120,8 +120,8 @@ impl Prediction {
         }
     }
 
-    /// Minimum numbers of chips for a frame rate, at least one. A rate that is missed only by rounding
-    /// (relative error 1e-9) counts as met.
+    /// Minimum numbers of chips for a frame rate; at least one. A rate counts as reached if it is missed by a
+    /// relative error of at most 1e-9, which is rounding.
     pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
         let chips = |tiles_per_second: f64| {
             let ratio = frames_per_second * self.tiles / tiles_per_second;
@@ -133,7 +133,7 @@ impl Prediction {
         ChipsNeeded { bandwidth, computation, overall: is_carried.then(|| bandwidth.max(computation)) }
     }
 
-    /// Fraction of the host's link that a frame rate uses. Above 1 the link cannot carry it.
+    /// Bandwidth of the host's link that a frame rate needs, as a fraction of the available bandwidth.
     pub fn link_load(&self, frames_per_second: f64) -> f64 {
         frames_per_second / self.link_frames_per_second
     }

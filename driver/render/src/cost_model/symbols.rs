@@ -1,4 +1,5 @@
-//! Symbols of the cost model: those of Table 7.1, and a few that the table implies or leaves open.
+//! Symbols of the cost model: those of the dissertation's Table 7.1, and a few that it implies or leaves
+//! open.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::frame::MAX_FRAME;
@@ -53,15 +54,15 @@ pub struct Symbols {
     pub photon_bytes: f64,
     /// `S_L`: bytes of a line of card memory.
     pub line_bytes: f64,
-    /// `B_G`: bytes of the photon map read from DRAM per gather, with reordering.
+    /// `B_G`: bytes of the photon map read from DRAM per gather, with reordering of gathers.
     pub gather_dram: f64,
-    /// `B_N`: bytes of the photon map read from DRAM per gather, without reordering.
+    /// `B_N`: bytes of the photon map read from DRAM per gather, without reordering of gathers.
     pub naive_gather_dram: f64,
     /// `B_R`: bytes of the scene read from DRAM per ray.
     pub ray_dram: f64,
     /// `C_IC`: FLOPs per record in an interpolation.
     pub interpolation: f64,
-    /// `C_IR`: FLOPs that an irradiance record adds to each of its final gather rays.
+    /// `C_IR`: additional FLOPs per final gather ray of an irradiance record.
     pub record_ray: f64,
     /// `C_T1`: FLOPs per photon in an importance table.
     pub table_photon: f64,
@@ -71,15 +72,15 @@ pub struct Symbols {
     pub pixel_bytes: f64,
     /// `B_T`: bytes per tile command on the host's link.
     pub command_bytes: f64,
-    /// `f`: number of links below a switch of the tree between host and chips.
+    /// `f`: number of links from a switch towards the chips, in the tree of switches between host and chips.
     pub fan_out: f64,
-    /// `S_F`: bytes that a switch receives before it forwards them.
+    /// `S_F`: number of bytes that a switch receives before it forwards them.
     pub frame_bytes: f64,
 }
 
 impl Symbols {
-    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`. Its lower
-    /// end is used, which is also the driver's default.
+    /// Nominal values of Table 7.1. For `N_PM` the public excerpts of the table give only a range. Its lower
+    /// end is used, which is also the default of the driver.
     pub const NOMINAL: Self = Self {
         tile_pixels: 256.0,
         tiles: 1024.0,
@@ -161,7 +162,7 @@ impl Symbols {
     }
 }
 
-/// Number of gathers per frame in the published bandwidths: 512 x 512 pixels with 100 rays each.
+/// Number of gathers per frame to which the published bandwidths refer: 512 x 512 pixels with 100 rays each.
 const GATHERS: f64 = 512.0 * 512.0 * 100.0;
 
 /// Error of [`Symbols::set`].

@@ -1,4 +1,4 @@
-//! Workload of one frame: counts that the symbols of Table 7.1 imply, or that a run measured.
+//! Workload of one frame: counts that follow from the symbols of Table 7.1, or that a run has measured.
 
 use photoncard_shared::counters::Counters;
 
@@ -14,15 +14,15 @@ pub struct Workload {
     pub shadow_rays: f64,
     /// Number of final gather rays, including those of irradiance records. Nominal: `T P R_FG N_FG`.
     pub gather_rays: f64,
-    /// Number of rays that survey the surroundings of irradiance records. Nominal: 0, because the table has
-    /// no survey.
+    /// Number of rays that survey the surroundings of irradiance records. Nominal: 0, because Table 7.1 has
+    /// no such rays.
     pub survey_rays: f64,
     /// Number of photon searches at the ends of gather rays. Nominal: `T P R_FG N_FG`, one per gather ray.
     pub ray_gathers: f64,
     /// Number of photon searches for importance tables. Nominal: `T P R_FG`, one per pixel with a final
     /// gather.
     pub table_gathers: f64,
-    /// Number of photons that a gather returns, which are then reflected or counted in a table. Nominal: `k`.
+    /// Mean number of photons that a gather returns, to be reflected or counted in a table. Nominal: `k`.
     pub photons_per_gather: f64,
     /// Number of samples whose irradiance is interpolated. Nominal: `T P R_IC`.
     pub interpolated_samples: f64,
@@ -42,7 +42,7 @@ pub struct Workload {
 }
 
 impl Workload {
-    /// Workload of Table 7.1's nominal frame with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
+    /// Workload of a frame with all three techniques, by Table 7.1. It has `T P (1 + R_FG N_FG + N_S)` rays.
     pub fn nominal(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         let gathering_pixels = pixels * symbols.gathering_share();
@@ -59,8 +59,8 @@ impl Workload {
         workload
     }
 
-    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather with `N_FG`
-    /// rays, and each photon gather reads `B_N` bytes.
+    /// Workload of a frame without the three techniques, by Table 7.1. Every pixel has a final gather with
+    /// `N_FG` rays, and each photon gather reads `B_N` bytes.
     pub fn naive(symbols: &Symbols) -> Self {
         let rays = symbols.pixels() * symbols.gather_rays;
         let mut workload = Self { gather_rays: rays, ray_gathers: rays, ..Self::of_pixels(symbols) };
@@ -69,7 +69,8 @@ impl Workload {
         workload
     }
 
-    /// Part of the workload that interpolated pixels and pixels with a final gather have in common.
+    /// Workload that does not depend on the number of interpolated pixels: eye rays, shadow rays, photons per
+    /// gather, tiles and transfers over the link.
     fn of_pixels(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         Self {
@@ -83,7 +84,7 @@ impl Workload {
         }
     }
 
-    /// Workload from the counters of chips. Bytes and tiles are zero, because [`Counters`] lacks them.
+    /// Workload measured by the counters of chips. Bytes and tiles are zero, because [`Counters`] lacks them.
     pub fn counted(counters: &Counters) -> Self {
         Self {
             eye_rays: counters.eye_rays as f64,

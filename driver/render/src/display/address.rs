@@ -1,4 +1,4 @@
-//! Address of a display server, and errors of showing a picture there.
+//! Address of a display server, and errors of the connection to it.
 
 use std::str::FromStr;
 use std::{fmt, io};

@@ -59,8 +59,7 @@ impl Packet {
         packet
     }
 
-    /// Appends a text and its terminating zero byte. Characters that do not print, such as zero bytes, are
-    /// escaped.
+    /// Appends a text and its terminating zero byte. Escapes unprintable characters, such as zero bytes.
     fn text(&mut self, text: &str) {
         self.0.extend(printable(text).bytes().chain([0]));
     }

@@ -8,7 +8,7 @@ use photoncard_shared::message::Tile;
 
 use super::DisplayError;
 
-/// Queue of packets from the display to its thread, with the state of sending.
+/// Queue of packets from the display to its sending thread, and the progress of sending.
 #[derive(Default)]
 pub(super) struct PacketQueue {
     packets: VecDeque<Vec<u8>>,
@@ -18,11 +18,11 @@ pub(super) struct PacketQueue {
     is_sending: bool,
     /// Number of bytes sent so far.
     pub(super) sent: u64,
-    /// Tiles that were not queued because there was no room.
+    /// Tiles that were not queued because the queue was full.
     pub(super) missed: Vec<Tile>,
-    /// True after the display was dropped. Nothing more is sent then.
+    /// True after the display was dropped. No more packets are sent then.
     pub(super) is_closed: bool,
-    /// True after a failure. Nothing more can be sent then.
+    /// True after a failure. No more packets can be sent then.
     has_failed: bool,
     /// The failure, until [`Self::take_failure`] returns it.
     failure: Option<DisplayError>,
@@ -39,7 +39,7 @@ impl PacketQueue {
         self.packets.is_empty() && !self.is_sending
     }
 
-    /// Number of packets that are not completely sent, plus tiles that were not queued.
+    /// Number of packets that are not completely sent, plus the number of tiles that were not queued.
     pub(super) fn left(&self) -> usize {
         self.packets.len() + usize::from(self.is_sending) + self.missed.len()
     }
@@ -50,13 +50,12 @@ impl PacketQueue {
         self.waiting == 0 || self.waiting + bytes <= most
     }
 
-    /// Appends a packet to the queue.
     pub(super) fn push(&mut self, packet: Vec<u8>) {
         self.waiting += packet.len();
         self.packets.push_back(packet);
     }
 
-    /// Ends the display with an error and drops the queue. Only the first error is kept.
+    /// Ends the display with an error and empties the queue. Only the first error is kept.
     pub(super) fn fail(&mut self, error: DisplayError) {
         if self.is_open() {
             self.failure = Some(error);
@@ -82,7 +81,7 @@ pub(super) struct SharedQueue {
 
 impl SharedQueue {
     pub(super) fn lock(&self) -> MutexGuard<'_, PacketQueue> {
-        // A thread that panicked left no change half done.
+        // A thread that panicked has left the queue consistent.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -93,7 +92,7 @@ impl SharedQueue {
         result
     }
 
-    /// Waits until `is_ready` is true, for at most `most`. Returns whether it is.
+    /// Waits until `is_ready` returns true, for at most the time `most`. Returns its last result.
     pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
         let is_not_ready = |queue: &mut PacketQueue| !is_ready(queue);
         let waited = self.changed.wait_timeout_while(self.lock(), most, is_not_ready);
@@ -117,8 +116,8 @@ impl SharedQueue {
         }
     }
 
-    /// Counts bytes of the current packet as sent; `is_last` ends the packet. Returns whether to go on
-    /// sending.
+    /// Counts `bytes` more bytes of the current packet as sent; `is_last` is true if they end the packet.
+    /// Returns whether to send more.
     pub(super) fn advance(&self, bytes: usize, is_last: bool) -> bool {
         self.change(|queue| {
             queue.sent += bytes as u64;

@@ -18,13 +18,13 @@ use super::{DisplayAddress, DisplayError};
 
 /// Time limit of a connection attempt.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
-/// Time limit of a write. After it the thread checks whether the display was closed.
+/// Time limit of a write, and interval at which the thread checks whether the display was closed.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
 /// Maximum number of bytes in the queue: five million RGB pixels.
 const MAX_WAITING: usize = 64 << 20;
-/// Maximum time without progress after the picture is complete.
+/// Maximum time without progress of sending after the picture is complete. The display is then given up.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Maximum time to send the queue after the picture is complete.
+/// Maximum time to send the remaining packets after the picture is complete.
 const MAX_AT_END: Duration = Duration::from_secs(20);
 
 /// Settings of a display: the server, and the name of the image there.
@@ -36,7 +36,7 @@ pub struct DisplaySettings {
     pub image: String,
 }
 
-/// Picture of a film's crop window on a display server.
+/// Connection to a display server that shows the crop window of a film.
 ///
 /// Dropping the display ends its thread, even if packets are still to be sent.
 pub struct Display {
@@ -48,7 +48,8 @@ pub struct Display {
 }
 
 impl Display {
-    /// Begins to show the crop window `window` with these channels. [`Viewer::failure`] reports errors.
+    /// Begins to show the crop window `window` with the channels `channels`. Does not wait for the server:
+    /// [`Viewer::failure`] reports errors.
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
         Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
@@ -94,8 +95,8 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// Ends the display because the server is too slow. The waiting packets, and up to `missed` tiles, are
-    /// not shown.
+    /// Ends the display because the server is too slow. The error counts the unsent packets, and `missed`
+    /// more for tiles that were not queued.
     fn give_up(&self, missed: usize) {
         let packets = self.queue.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
@@ -107,7 +108,7 @@ impl Display {
 }
 
 impl TileSink for Display {
-    /// Shows a tile: now, or, if the queue is full, when the picture is [finished](Viewer::finish).
+    /// Queues a tile to be shown. If the queue is full, `Viewer::finish` sends the tile.
     fn put(&self, tile: &FinishedTile) {
         if !self.queue.lock().is_open() {
             return;
@@ -131,8 +132,8 @@ impl Viewer for Display {
         self.queue.lock().take_failure().map(Into::into)
     }
 
-    /// Sends the tiles that were not queued before, and waits until everything is sent, for at most 20 s, and
-    /// at most 2 s without progress.
+    /// Sends the tiles that were not queued before, and waits until all packets are sent. Gives up after 20
+    /// seconds, or after 2 without progress.
     fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.queue.lock().missed);
         let mut watch = Watch::new();
@@ -160,7 +161,7 @@ impl Drop for Display {
     }
 }
 
-/// Watchdog of the progress of a display.
+/// Watchdog that detects a display that takes too long to finish.
 struct Watch {
     begun: Instant,
     moved: Instant,
@@ -173,7 +174,8 @@ impl Watch {
         Self { begun: now, moved: now, sent: 0 }
     }
 
-    /// Waits until `is_ready` is true. Returns false if the display takes too long.
+    /// Waits until `is_ready` returns true. Returns false after `MAX_AT_END` in all, or `PATIENCE` without
+    /// progress.
     fn wait_until(&mut self, queue: &SharedQueue, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
         while !queue.wait_until(WRITE_WAIT, &is_ready) {
             let sent = queue.lock().sent;

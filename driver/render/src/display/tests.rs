@@ -47,7 +47,7 @@ fn failure(display: &Display) -> Option<DisplayError> {
     display.failure().map(|error| *error.downcast().expect("an error of a display"))
 }
 
-/// Shows all tiles of a picture, and finishes it. A display that never ends would hang the test.
+/// Shows all tiles of a picture, and finishes it.
 fn show(display: &Display, film: &Film, tiles: &[Tile]) {
     tiles.iter().for_each(|tile| display.put(&film.finished(tile).unwrap()));
     display.finish(film);

@@ -1,4 +1,4 @@
-//! Kinds of emulated chips from JSON files, and the on-chip memory that capacities take.
+//! Kinds of emulated chips with the capacities in a JSON file, and the on-chip memory that these need.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -28,8 +28,8 @@ const MAX_SRAM: u64 = 16 << 20;
 /// Minimum memory of an emulated card, bytes.
 pub const MIN_DRAM_BYTES: u64 = 1 << 20;
 
-/// Capacities in a file, with the ranges that the chip's indices and the host's searches allow. A capacity
-/// that the file does not state is that of the reference chip.
+/// Names and ranges of the capacities in a file. The indices of the chip and the searches of the host limit
+/// the ranges. A capacity that the file does not state is that of the reference chip.
 const RANGES: [(&str, RangeInclusive<u64>); 15] = [
     ("sram_bytes", 1..=MAX_SRAM),
     ("dram_bytes", MIN_DRAM_BYTES..=MAX_DRAM_BYTES),
@@ -57,7 +57,7 @@ pub enum ChipError {
     /// The file is no JSON object.
     #[error("it is no JSON object of capacities, which are numbers: {0}")]
     Syntax(#[from] serde_json::Error),
-    /// A field of the file is no capacity.
+    /// A field of the file is not the name of a capacity.
     #[error("{name:?} is none of {}", RANGES.map(|(name, _)| name).join(", "))]
     Unknown {
         /// Name of the field.
@@ -88,7 +88,7 @@ pub enum ChipError {
 }
 
 impl Emulated {
-    /// Reads a kind from a file.
+    /// Reads the capacities of a kind of chip from a JSON file.
     ///
     /// # Errors
     /// If the file cannot be read, or the kind is impossible.
@@ -98,8 +98,8 @@ impl Emulated {
         Self::from_json(&text)
     }
 
-    /// Reads a kind from a JSON object of capacities. Capacities that the object does not state are the
-    /// reference chip's.
+    /// Reads the capacities of a kind of chip from a JSON object. Capacities that the object does not state
+    /// are those of the reference chip.
     ///
     /// # Errors
     /// The first capacity that is unknown, out of its range or contradicts others.
@@ -129,7 +129,7 @@ impl Emulated {
         fields
     }
 
-    /// Checks the capacities that depend on others, as the firmware does for kinds that are types.
+    /// Checks capacities that depend on each other, as the firmware does for chips whose kind is a Rust type.
     fn check(&self) -> Result<(), ChipError> {
         let Budget { photon_cache_bytes, scene_cache_bytes, irradiance_records, in_flight, tiles, .. } =
             self.budget;
@@ -165,15 +165,15 @@ impl Emulated {
         self.sizes()[0] + cache_bytes(&self.budget) + self.budget.stack_bytes as usize
     }
 
-    /// On-chip memory that each technique adds, bytes.
+    /// On-chip memory, bytes, that reordering, irradiance cache and importance sampling each add.
     pub fn techniques(&self) -> TechniqueMemory {
         let [_, reordering, irradiance_cache, importance_sampling] = self.sizes();
         TechniqueMemory { reordering, irradiance_cache, importance_sampling }
     }
 
-    /// Sizes, bytes, of the firmware's memory on a card with these capacities, and of its parts for
-    /// reordering, irradiance cache and importance sampling. They are extrapolated: the size of a buffer is
-    /// linear in its number of entries, and that of the chip in its number of tiles in flight.
+    /// Sizes in bytes: of the whole firmware's memory with these capacities, and of its parts for reordering,
+    /// irradiance cache and importance sampling. They are extrapolated from probes, because the size of a
+    /// buffer is linear in its number of entries, and that of the chip in its number of tiles in flight.
     fn sizes(&self) -> [usize; 4] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
         let [pixels, queue, records, flights] =
@@ -189,11 +189,11 @@ impl Emulated {
 
 /// Alignment of the chip's buffers, bytes.
 const ALIGNMENT: usize = 8;
-/// Number of entries of each buffer of the smallest probe. Each other probe has twice as many in one buffer.
+/// Number of entries of each buffer in the smallest `Probe`. Each other probe doubles one buffer.
 const PROBED: usize = 64;
 
-/// Extrapolates sizes to the numbers of entries `entries`, from the sizes of the smallest probe and of probes
-/// that have twice as many entries in one buffer.
+/// Extrapolates sizes linearly to buffers with the numbers of entries `entries`. The given sizes are those of
+/// the smallest probe, then of five probes that each have twice as many entries in one buffer.
 fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
     std::array::from_fn(|i| {
         let size = |sizes: &[usize; 4]| sizes[i] as i64;
@@ -222,7 +222,7 @@ const fn sizes_of<K: FixedKind>() -> [usize; 4] {
     [size_of::<Card<K, Dram<'static>>>(), reordering, irradiance_cache, importance_sampling]
 }
 
-/// Kind whose chip is measured by `size_of` and never built. The parameters are the numbers of pixels,
+/// Kind of chip that is measured by `size_of` and never built. The parameters are the numbers of pixels,
 /// candidates, gathers, irradiance records, gather points and tiles in flight.
 struct Probe<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize>;
 

@@ -1,8 +1,9 @@
 //! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
 //!
-//! A chip tests everything in a line, so that these counts are the exact numbers of its units' steps. Only
-//! the boxes of a caustic node that a search skips by its classes of normals are counted and not tested. The
-//! cost model ([`crate::cost_model`]) multiplies the counts by the operations per step.
+//! A chip tests everything in a line that it reads, so that these counts are the exact numbers of steps of
+//! its units. The only exceptions are boxes in nodes of the caustic map: a search skips those whose classes
+//! of normals cannot match, and they are counted all the same. The cost model ([`crate::cost_model`])
+//! multiplies the counts by the operations per step.
 
 use std::ops::Range;
 
@@ -19,7 +20,7 @@ pub struct Contents {
     pub nodes: u64,
     /// Number of boxes in nodes of the bounding volume hierarchy.
     pub boxes: u64,
-    /// Number of leaves of the hierarchy, without those read again for one triangle of a surface.
+    /// Number of leaves of the hierarchy. A leaf that is read again for one triangle is not counted.
     pub leaves: u64,
     /// Number of vertices in leaves of the hierarchy.
     pub vertices: u64,
@@ -29,9 +30,9 @@ pub struct Contents {
     pub materials: u64,
     /// Number of light records: nodes of the light tree, and emitters.
     pub lights: u64,
-    /// Number of inner nodes of photon maps and above irradiance points.
+    /// Number of inner nodes of the hierarchies over photons and irradiance points.
     pub photon_nodes: u64,
-    /// Number of boxes in inner nodes of photon maps and above irradiance points.
+    /// Number of boxes in inner nodes of the hierarchies over photons and irradiance points.
     pub photon_boxes: u64,
     /// Number of leaves of photons and irradiance points.
     pub photon_leaves: u64,
@@ -74,7 +75,7 @@ impl Contents {
         self.tree_photons += other.tree_photons;
     }
 
-    /// Counts the contents of a line, of which the chip uses the bytes `used`.
+    /// Counts the contents of a line that the chip has read, of which it uses the bytes `used`.
     fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], used: &Range<u32>) {
         match structure {
             Structure::Nodes => {

@@ -1,4 +1,4 @@
-//! Chips without cards and links: renders tiles straight from a card image, for studies.
+//! Renders tiles on emulated chips straight from a card image, without cards and links, for studies.
 
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
@@ -21,8 +21,8 @@ use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
-    /// Sums of the light of the pixels, row by row, in the card image's radiance units: one sum per pixel, or
-    /// with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`] sums.
+    /// Sums of light over the samples of each pixel, row by row, in the card image's radiance units. A pixel
+    /// has one sum, or with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`] sums.
     pub sums: Vec<ColourSum>,
     /// Albedo, normal and depth of the pixels, row by row.
     pub views: Vec<PixelView>,
@@ -66,9 +66,9 @@ impl From<Fault> for DirectError {
     }
 }
 
-/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `caches`,
-/// memory is modelled for each tile anew, with caches that are empty at first. `is_stopped` is polled before
-/// each tile.
+/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `caches`, the
+/// memory is modelled, and caches are empty at the beginning of each tile. `is_stopped` is polled before each
+/// tile.
 ///
 /// # Errors
 /// If the card image is malformed, a chip has no room for a tile, or the work is stopped.
@@ -91,8 +91,9 @@ pub fn render_tiles_apart(
     pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
 }
 
-/// Renders tiles on one chip of a kind with modelled memory, with as many in flight as the frame and the chip
+/// Renders tiles on one chip of a kind with modelled memory, as many at a time as the frame and the chip
 /// allow. `take` is called with each finished tile, without its traffic, and returns whether to continue.
+/// Returns the traffic of all tiles.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for a tile.
@@ -111,7 +112,7 @@ pub fn render_tiles_in_flight(
     Ok(memory.traffic())
 }
 
-/// Renders a tile from a card image, like [`render_tile`]. With `caches`, memory is modelled.
+/// Renders a tile from a card image, like [`render_tile`]. With `caches`, the memory is modelled.
 ///
 /// # Errors
 /// As [`render_tile`].
@@ -130,8 +131,8 @@ pub fn render_tile_of(
     }
 }
 
-/// Renders a tile on a chip with a memory of its own. With an `outlet`, the gathers of pixels are passed to
-/// the outlet; the caller must then do them and add the results to the sums.
+/// Renders a tile on a chip that reads `memory`. With an `outlet`, the photon gathers of the pixels are
+/// passed to the outlet and not done. The caller must then do them, and add the results to the sums.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
@@ -154,8 +155,8 @@ pub fn render_tile(
     Ok(RenderedTile { traffic: memory.traffic(), ..rendered })
 }
 
-/// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with
-/// each finished tile, in any order and without its traffic, and returns whether to continue.
+/// Renders tiles on a chip, as many at a time as the frame and the chip allow. `take` is called with each
+/// finished tile, in any order and without its traffic, and returns whether to continue.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for a tile.

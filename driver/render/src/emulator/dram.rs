@@ -1,11 +1,11 @@
-//! DRAM of an emulated card, copy-on-write over the host's card image.
+//! DRAM of an emulated card, with copy-on-write of the host's card image.
 //!
 //! A host and its emulated cards are in one process, and the DRAM of each card contains the same card image.
-//! A card can get the image by reference before its first line is written, and checks it like a received one;
-//! or it receives the image line by line over its link. As long as the received lines equal the lines of the
-//! host's image at the same addresses, the card stores no copy and reads the host's lines. Lines beyond the
-//! image are the card's own. At the first line of the image that differs, the card switches to lines of its
-//! own, so that it always reads what was written.
+//! A card gets the image in one of two ways. It can get the image by reference before its first line is
+//! written, and checks it like a received one. Or it receives the image line by line over its link. As long
+//! as the received lines equal the lines of the host's image at the same addresses, the card stores no copy
+//! and reads the host's lines. Lines beyond the image are the card's own. At the first line of the image that
+//! differs, the card switches to lines of its own, so that it always reads what was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -17,7 +17,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
-/// The host's card image; empty before [`Self::give`].
+/// Handle to a card image of the host; empty before [`Self::give`].
 #[derive(Clone, Default)]
 pub(crate) struct SharedImage(Arc<OnceLock<Given>>);
 
@@ -28,15 +28,15 @@ struct Given {
 }
 
 impl SharedImage {
-    /// Shares the image with the cards. Later calls have no effect. Cards that hold the image need not
-    /// compute a known checksum again.
+    /// Shares the image with all cards that have this handle. Later calls have no effect. A card with the
+    /// image need not compute a known checksum again.
     pub(crate) fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(Given { image, checksum });
     }
 }
 
-/// DRAM that takes host memory only for written lines, and none for lines that equal the shared image's.
+/// DRAM that takes host memory only for written lines, and not while they equal those of the shared image.
 pub(super) struct EmulatedDram<'a> {
     lines: Stored<'a>,
     limit: u32,
@@ -45,10 +45,10 @@ pub(super) struct EmulatedDram<'a> {
     held: SharedImage,
 }
 
-/// Lines from the first to the last written one.
+/// Stored lines, from line 0 to the last written one.
 enum Stored<'a> {
     Own(Vec<Line>),
-    /// Lines of a card image that is borrowed until the first write.
+    /// Lines of a card image, borrowed until the first write.
     Lent(&'a [Line]),
     /// The first `written` lines of an image, by reference, and lines after the whole image.
     Shared {
@@ -75,7 +75,7 @@ impl<'a> EmulatedDram<'a> {
         }
     }
 
-    /// Image that the memory contains by reference, if no line was written.
+    /// Image that the memory contains by reference; `None` after a line was written.
     fn held(&self) -> Option<&Given> {
         self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
     }
@@ -114,8 +114,8 @@ impl<'a> EmulatedDram<'a> {
         }
     }
 
-    /// Stores lines by reference if they equal those of the shared image and leave no gap after the lines
-    /// written so far. Returns whether the lines are stored.
+    /// Stores lines by reference if they equal the lines of the shared image at the same addresses, and begin
+    /// at most at the end of the lines written so far. Returns whether the lines are stored.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(Given { image, .. }) = self.shared.0.get()
@@ -132,8 +132,8 @@ impl<'a> EmulatedDram<'a> {
         shares
     }
 
-    /// Returns the card's own lines, and the index of line `first` in them. If `first` is in a shared image,
-    /// all lines are copied before.
+    /// Returns the vector of the card's own lines to which line `first` belongs, and the index of that line
+    /// in it. If line `first` is in a shared or borrowed image, the lines of the image are copied before.
     fn own_from(&mut self, first: usize) -> (&mut Vec<Line>, usize) {
         if let Stored::Shared { image, written, beyond } = &self.lines
             && first < image.lines().len()

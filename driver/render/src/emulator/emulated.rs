@@ -1,5 +1,5 @@
-//! The kind of emulated chips. Its capacities are values, so that one copy of the chip's code serves chips of
-//! all capacities.
+//! Kind of emulated chips. Its capacities are run-time values, so that one copy of the chip's code serves
+//! chips of all capacities.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hash, Hasher};
@@ -9,7 +9,7 @@ use photoncard_firmware::kind::{Array, Buffer, Capacity, ChipKind, FixedCapacity
 use photoncard_firmware::photon::{CandidateStorage, Candidates};
 use photoncard_shared::budget::Budget;
 
-/// Kind of chips whose buffers are on the heap.
+/// Kind of chip whose buffers are on the heap, with the sizes given here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emulated {
     pub(super) budget: Budget,
@@ -23,8 +23,8 @@ impl Emulated {
         Self { budget: K::BUDGET, points: K::Points::ENTRIES }
     }
 
-    /// Replaces the budget, which must be within the ranges of a chip's indices. The number of gather points
-    /// does not change.
+    /// Replaces the budget by `budget`, which must be in the ranges that the indices of a chip allow. The
+    /// number of gather points does not change.
     #[must_use]
     pub fn with_budget(self, budget: Budget) -> Self {
         Self { budget, ..self }
@@ -60,7 +60,7 @@ impl ChipKind for Emulated {
     }
 }
 
-/// Family of containers on the heap, whose capacities are values.
+/// Family of containers on the heap, whose capacities are set at run time.
 #[derive(Clone, Copy, Debug)]
 pub enum Heap {}
 
@@ -247,7 +247,7 @@ impl Hasher for FnvState {
     }
 }
 
-/// Squared distances and contents of the candidates of a photon search.
+/// Squared distances and contents of the photons that are candidates of a photon search.
 #[derive(Debug)]
 pub struct HeapCandidates {
     distances: Vec<u32>,

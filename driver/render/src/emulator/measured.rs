@@ -9,10 +9,10 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Memory that measures its traffic, behind a trait object.
+/// Memory that measures its traffic, of any type, behind a trait object.
 ///
-/// The chip's code is compiled for each type of memory, and inlines the code of the memory into each of its
-/// reads. This type is the only measured memory for which the chip is compiled.
+/// The chip's code is compiled anew for each type of memory. With this type, it is compiled only once for all
+/// measured memories.
 pub struct Measured<'a>(Box<dyn MeasuredCard + Send + 'a>);
 
 trait MeasuredCard: CardMemory + MeasuredMemory {}

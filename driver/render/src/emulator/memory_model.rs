@@ -100,8 +100,8 @@ impl fmt::Display for CacheSettings {
 impl FromStr for CacheSettings {
     type Err = String;
 
-    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, in which each part is optional, or
-    /// `unified=256K/128/8`.
+    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash` or `unified=256K/128/8,index=hash`. Parts that
+    /// are left out have default values.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;
@@ -179,8 +179,8 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
     }
 }
 
-/// A memory behind caches. Traffic is counted above and below them, and so are the contents of the lines that
-/// the chip reads.
+/// A memory behind caches. The traffic above and below the caches is counted, and so are the contents of the
+/// lines that the chip reads.
 pub type ModelledMemory<M> = Inspected<Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>>;
 
 impl CacheSettings {
@@ -197,9 +197,9 @@ impl CacheSettings {
 /// Memory traffic of a chip, above and below its caches.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryTraffic {
-    /// Reads by the chip, above the caches. A read is a record.
+    /// Reads requested by the chip, above the caches. Each is a range of bytes in one line of card memory.
     pub requested: Traffic,
-    /// Reads from DRAM, below the caches. A read is a line of card memory.
+    /// Reads from DRAM, below the caches. Each is a whole line of card memory.
     pub fetched: Traffic,
     /// Contents of the lines that the chip read.
     pub contents: Contents,
@@ -217,7 +217,8 @@ impl MemoryTraffic {
         self.contents.add(&other.contents);
     }
 
-    /// Reads of the chosen structures for tiles: those requested by the chip, and those fetched from DRAM.
+    /// Reads of the structures that `chosen` selects, for tiles: requested by the chip, and fetched from
+    /// DRAM.
     pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> [Reads; 2] {
         [self.requested.of_tiles(&chosen), self.fetched.of_tiles(&chosen)]
     }

@@ -1,5 +1,4 @@
-//! Emulated cards: the firmware on threads of this process, one chip per thread, with a loopback link per
-//! chip.
+//! Emulated cards: the firmware runs on threads of this process, one chip and one loopback link per thread.
 
 mod chip_file;
 pub mod contents;
@@ -49,7 +48,7 @@ pub enum EmulatedKind {
     Large,
     /// Chip with the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
-    /// Chip with the capacities of a file.
+    /// Chip with the capacities in a file.
     File(Emulated),
 }
 
@@ -81,7 +80,7 @@ impl EmulatedKind {
         self.emulated().sram_bytes()
     }
 
-    /// On-chip memory that each technique adds, bytes.
+    /// On-chip memory, bytes, that reordering, irradiance cache and importance sampling each add.
     pub fn techniques(self) -> TechniqueMemory {
         self.emulated().techniques()
     }
@@ -91,15 +90,15 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget, whatever its card's memory: `reference`, `large`, `micro`
-    /// or `other`. The chip may be on a board.
+    /// Name of the kind of chip with this budget: `reference`, `large`, `micro` or `other`. The size of card
+    /// memory does not matter. The chip may also be on a board.
     pub fn name_of(budget: &Budget) -> &'static str {
         let is = |kind: &Budget| Budget { dram_bytes: kind.dram_bytes, ..*budget } == *kind;
         let kinds = [(&kind::REFERENCE, "reference"), (&kind::LARGE, "large"), (&kind::MICRO, "micro")];
         kinds.into_iter().find(|(kind, _)| is(kind)).map_or("other", |(_, name)| name)
     }
 
-    /// Capacities of this kind, as values.
+    /// Capacities of this kind, as the run-time values of an emulated chip.
     pub fn emulated(self) -> Emulated {
         match self {
             Self::Reference => Emulated::like::<Reference>(),
@@ -114,7 +113,7 @@ impl EmulatedKind {
         *self.emulated().budget()
     }
 
-    /// Caches with the budget's sizes and four ways.
+    /// Model of the caches of this kind: the sizes of its budget, with four ways.
     pub fn caches(self) -> CacheSettings {
         let budget = self.budget();
         CacheSettings::Split {
@@ -132,7 +131,7 @@ impl EmulatedKind {
 
 /// Capacity of a loopback link in each direction, bytes.
 const LINK_CAPACITY: usize = 64 << 10;
-/// Number of bytes from a card at which the host is woken: a third of the frames that may be in flight.
+/// Number of unread bytes from a card at which the host is woken: a third of the frames in flight.
 const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
 
 /// Model of an emulated card's memory.
@@ -143,9 +142,9 @@ pub(crate) struct MemoryModel {
     pub(crate) trace: Option<TraceFile>,
 }
 
-/// Record of a modelled memory, made when its card ends.
+/// Traffic and trace of a modelled memory, returned when its card ends.
 pub(crate) struct MemoryRecord {
-    /// Traffic during the card's whole life.
+    /// Traffic from the start of the card to its end.
     pub(crate) traffic: MemoryTraffic,
     /// Unfinished trace of the reads.
     pub(crate) trace: Option<TraceFile>,
@@ -157,14 +156,14 @@ pub(crate) struct EmulatedCard {
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
     tile_lines: TileLines,
-    /// Handle that gives a card image to the empty memory by reference; `None` once taken, and for a modelled
-    /// memory.
+    /// Handle by which the empty memory can get a card image by reference. `None` after it was taken, and for
+    /// a modelled memory.
     held: Option<SharedImage>,
 }
 
 impl EmulatedCard {
-    /// Starts a card. Without a model its memory has neither caches nor counters. A card that is loaded with
-    /// the image in `shared` stores no copy of it.
+    /// Starts a card. Without a model, its memory has neither caches nor counters. If the card is loaded with
+    /// the image in `shared`, it stores no copy.
     ///
     /// # Errors
     /// If the card's thread cannot be started.
@@ -188,8 +187,8 @@ impl EmulatedCard {
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
-    /// Takes the handle that gives a card image by reference to a memory into which nothing was loaded;
-    /// `None` from the second call on, and for a modelled memory.
+    /// Takes the handle by which a memory into which nothing was loaded can get a card image by reference.
+    /// Returns `None` from the second call on, and for a modelled memory.
     pub(crate) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }
@@ -212,7 +211,7 @@ impl EmulatedCard {
         &self.tile_lines
     }
 
-    /// Ends the card. Returns the record of its memory if that is modelled.
+    /// Ends the card. Returns the traffic and the trace of its memory if the memory is modelled.
     ///
     /// # Panics
     /// If the chip panicked.

@@ -1,5 +1,5 @@
-//! Number of lines that a chip read from its DRAM for each tile. The number is passed beside the link,
-//! because card and host are in one process.
+//! Number of lines that a chip reads from its DRAM for each tile. The host gets it directly and not over the
+//! link, because card and host are in one process.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Number of DRAM lines by tile, for the tiles that a card has rendered.
+/// Number of DRAM lines read for each tile that a card has rendered, by tile number.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileLines(Arc<Mutex<HashMap<u32, u64>>>);
 
@@ -21,8 +21,8 @@ impl TileLines {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(tile, lines);
     }
 
-    /// Takes the number of lines of a tile that the card has rendered; `None` if its memory is not modelled.
-    /// If several tiles are in flight, a tile counts the lines since the previous one ended.
+    /// Removes and returns the number of lines of a tile that the card has rendered; `None` if its memory is
+    /// not modelled. If several tiles are in flight, a tile counts all lines since the previous one ended.
     pub(crate) fn take(&self, tile: u32) -> Option<u64> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile)
     }

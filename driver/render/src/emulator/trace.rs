@@ -1,10 +1,10 @@
-//! Trace files of a chip's memory: every read for tiles, above the caches for a cache simulator, or below
+//! Trace files of the memory reads of a chip for its tiles: above the caches for a cache simulator, or below
 //! them for a DRAM simulator.
 //!
 //! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
 //! blank, and a byte address in hexadecimal. Label 0 is a read of data. Label 4 is Dinero's escape that
-//! flushes its caches; it is written at the beginning of every tile with address 0. Dinero ignores the rest
-//! of a line, where a labelled trace has the structure, the stage and the bytes of the read. Below the
+//! flushes its caches; it is written at the beginning of every tile with address 0. A labelled trace adds the
+//! structure, the stage and the number of bytes of the read to the line; Dinero ignores them. Below the
 //! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of
 //! `DRAMsim3`. See `docs/memory.md`.
 
@@ -21,10 +21,10 @@ use photoncard_picture::choice::{Choice, choices};
 use photoncard_picture::output::{OutputError, PendingFile};
 use photoncard_shared::address::Structure;
 
-/// Size of the blocks in which text is compressed, bytes.
+/// Size of the blocks in which the text is compressed, bytes.
 const BUFFER: usize = 64 << 10;
-/// Maximum length of a line of text, bytes: a label, 39 bits in hexadecimal, the names of a structure and of
-/// a stage, three digits of bytes, blanks and the line feed.
+/// Maximum length of a line of text, bytes: a label, an address of 39 bits in hexadecimal, the names of a
+/// structure and of a stage, a byte count of three digits, blanks and the line feed.
 const LONGEST_LINE: usize = 64;
 
 const READ: u8 = 0;
@@ -38,8 +38,8 @@ pub enum TraceFormat {
     Dinero,
     /// Lines fetched from DRAM, for Ramulator 2's load-store trace.
     Ramulator,
-    /// Lines fetched from DRAM, for `DRAMsim3`. Each is one cycle after the previous one, so that the DRAM
-    /// always has work.
+    /// Lines fetched from DRAM, for `DRAMsim3`. Each fetch is one cycle after the previous one, so that the
+    /// DRAM always has work.
     Dramsim3,
 }
 
@@ -63,11 +63,12 @@ pub struct TraceSettings {
     pub path: PathBuf,
     /// Format of the lines.
     pub format: TraceFormat,
-    /// True if each read of [`TraceFormat::Dinero`] is followed by its structure, stage and number of bytes.
+    /// True if each read in a trace of [`TraceFormat::Dinero`] is followed by its structure, stage and byte
+    /// count.
     pub has_labels: bool,
 }
 
-/// Unfinished trace file, compressed by gzip. It appears under its name only when the trace is finished.
+/// Trace file that is being written, compressed by gzip. It appears under its path only when it is finished.
 pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
@@ -95,13 +96,13 @@ impl TraceFile {
         })
     }
 
-    /// Flag that is set if the file cannot be written. The render can then end, because there will be no
+    /// Flag that is set when the file cannot be written. The render can then end, because there will be no
     /// trace.
     pub fn has_failed(&self) -> Arc<AtomicBool> {
         self.has_failed.clone()
     }
 
-    /// Returns whether the trace is of the DRAM.
+    /// Returns whether the trace records fetches from DRAM, below the caches.
     pub fn is_below_caches(&self) -> bool {
         self.settings.format.is_below_caches()
     }

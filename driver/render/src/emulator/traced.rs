@@ -9,7 +9,7 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Memory that records its reads in a trace, if it has one.
+/// Memory that records its reads for tiles in a trace, if there is one.
 pub(super) struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,

@@ -52,7 +52,7 @@ pub enum PartialError {
         /// Descriptions of the settings that differ.
         differences: Vec<String>,
     },
-    /// Finished tiles would be lost, because the render does not resume.
+    /// The file has finished tiles that would be lost, because the render does not resume.
     #[error("{} has the finished tiles of an earlier render", path.display())]
     #[diagnostic(help(
         "go on from them with `outputs.partial.resume` and that render's settings; or remove the file to begin anew, \

@@ -9,24 +9,24 @@ use photoncard_picture::output::kind_of;
 
 use super::error::PartialError;
 
-/// Beginning of the first line of a partial render in all versions of its format. The version's number
-/// follows.
+/// Beginning of the first line of a partial render in all versions of the format, followed by the version
+/// number.
 pub(super) const FAMILY: &str = "photoncard partial render ";
 /// Maximum length of the first line, bytes: [`FAMILY`], a version of up to 10 digits, and the line feed.
 const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
-/// Maximum number of attempts to open a file that other processes create or remove at the same time.
+/// Maximum number of attempts to open a file while other processes create or remove it.
 const MAX_TRIES: usize = 16;
 
 /// First line of a partial render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Title {
-    /// The file ends within the line, so that it has no tiles.
+    /// The file ends within its first line, so that it contains no tiles.
     CutOff,
     /// Version of the format.
     Version(u32),
 }
 
-/// Reads the first line; `None` if the file is not a partial render.
+/// Reads the first line of a file; `None` if the file is not a partial render.
 pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>> {
     let mut line = Vec::new();
     reader.take(MAX_TITLE).read_until(b'\n', &mut line)?;
@@ -45,8 +45,8 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     }))
 }
 
-/// Opens and locks the file. A file that does not exist is created if `create` is true; otherwise the result
-/// is `None`.
+/// Opens and locks the file of a partial render. A file that does not exist is created if `create` is true;
+/// otherwise `None` is returned.
 pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialError> {
     let failed = |source| PartialError::File { path: path.to_owned(), source };
     for _ in 0..MAX_TRIES {
@@ -89,8 +89,7 @@ fn open_there(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// Refuses anything but a regular file, and a file with several hard links, because it may belong to somebody
-/// else.
+/// Checks that a file is a regular one with a single hard link. With several, it may belong to somebody else.
 fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
     let linked = has_other_names(found).then_some("file with other hard links");
     match kind_of(found.file_type()).or(linked) {
@@ -142,7 +141,7 @@ pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Returns true, because an open file keeps its name on other systems.
+/// Returns true, because on other systems an open file cannot be renamed or removed.
 #[cfg(not(unix))]
 pub(super) fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

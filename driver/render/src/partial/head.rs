@@ -15,7 +15,7 @@ use super::records::has_record;
 const MAX_SETTINGS: u64 = 1 << 20;
 
 pub(super) struct Head {
-    /// Settings that identify the picture, by option names.
+    /// Settings that identify the picture, as values by option names.
     pub(super) settings: Map<String, Value>,
     pub(super) bytes: u64,
     /// CRC-32C of title and settings.
@@ -27,13 +27,13 @@ pub(super) struct Head {
 pub struct PartialSettings {
     /// Path of the file.
     pub path: PathBuf,
-    /// True to take over the file's tiles; otherwise a file with tiles is an error.
+    /// True to take over the tiles in the file. If false, a file with tiles is an error.
     pub resume: bool,
 }
 
 impl PartialSettings {
-    /// Reads the settings of the samples that a render resumes from, by option names; `None` without
-    /// `resume`, or if the file does not exist or ends within its head.
+    /// Reads the settings in the file that a render resumes from, as values by option names. Returns `None`
+    /// without `resume`, or if the file does not exist or ends within its head.
     ///
     /// # Errors
     /// If the file is not a partial render of this version, its settings are damaged, or it is in use by
@@ -46,17 +46,18 @@ impl PartialSettings {
         Ok(read_head(&mut BufReader::new(&file), &self.path)?.map(|head| head.settings))
     }
 
-    /// Checks that a render may write the file: without `resume`, it must have no tiles.
+    /// Checks that a render may write the file. Without `resume`, the file must have no tiles.
     ///
     /// # Errors
-    /// If the file is in use or unreadable; without `resume`, also if it has tiles, is foreign or damaged.
+    /// If the file is in use, unreadable or not a partial render; without `resume`, also if it has tiles or
+    /// is damaged.
     pub fn check_free(&self) -> Result<(), PartialError> {
         let file = file::open(&self.path, false)?;
         file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))
     }
 }
 
-/// Reads the head; `None` if the file ends within it.
+/// Reads the head of a partial render; `None` if the file ends within it.
 pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option<Head>, PartialError> {
     let foreign = || PartialError::Foreign { path: path.to_owned() };
     match read_title(reader).map_err(failed(path))?.ok_or_else(foreign)? {

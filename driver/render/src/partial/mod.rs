@@ -12,13 +12,13 @@
 //! Numbers are little-endian. The first checksum covers the two lines. The checksum of a record covers the
 //! first checksum and all preceding bytes of the record. An incomplete last record, left when the process
 //! ended during a write, is truncated. A damaged record is skipped: the reader searches for the magic number
-//! of the next one. If two records contain the same pixel, the later one is used. The settings are those that
-//! pixels depend on, so that a resumed render can use other tiles, another order and other cards. They
-//! exclude the number of samples: a picture with more samples takes over complete ranges of samples from the
-//! first on, and renders the others.
+//! of the next one. If two records contain the same samples of a pixel, the later one is used. The settings
+//! are those that pixels depend on, so that a resumed render can use other tiles, another order and other
+//! cards. The number of samples is not among them: a picture with more samples takes over complete ranges of
+//! samples, beginning with the first sample, and renders the others.
 //!
 //! The render that writes the file locks it. A file with this name that is not a partial render is refused
-//! and left unchanged, and so is a file with tiles if the render does not resume.
+//! and left unchanged. The same holds for a file with tiles if the render does not resume.
 
 mod error;
 mod file;
@@ -49,7 +49,7 @@ use photoncard_picture::sink::{FinishedTile, TileSink};
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
-    /// Number of the first sample of the tiles that are appended.
+    /// Number of the first sample in the tiles that this render appends.
     first_sample: u32,
     kept: Mutex<KeptTiles>,
 }
@@ -59,11 +59,11 @@ pub struct PartialRender {
 struct KeptTiles {
     /// The file, locked; `None` until it is created.
     file: Option<File>,
-    /// Checksum of title and settings, after they are written.
+    /// Checksum of title and settings; `None` until they are written.
     head: Option<u32>,
     /// True if the file has tiles of the earlier render.
     holds_earlier: bool,
-    /// True if the file has tiles of this or the earlier render.
+    /// True if the file has tiles of this render or of the earlier one.
     holds_tiles: bool,
     /// Offset of each record of this render, by tile number.
     records: HashMap<u32, u64>,
@@ -72,13 +72,13 @@ struct KeptTiles {
 
 impl PartialRender {
     /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on,
-    /// except the number of samples, which `film` states. With [`PartialSettings::resume`], tiles of the file
-    /// are written into the film. If the file has all tiles of the picture's first samples, their film is the
-    /// second result, and `film` is left with the remaining samples.
+    /// except the number of samples, which `film` states. With [`PartialSettings::resume`], the tiles in the
+    /// file are written into `film`. If they contain all pixels of the picture's first samples, a film of
+    /// these is the second result, and `film` has the remaining samples.
     ///
     /// # Errors
-    /// If the file is not a partial render, in use by another render, or unreadable, or its settings are
-    /// damaged; if it is resumed but has other settings; or if it is not resumed but has tiles.
+    /// If the file is not a partial render, in use by another render, or unreadable; if its settings are
+    /// damaged, or differ although it is resumed; or if it has tiles and is not resumed.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -106,8 +106,8 @@ impl PartialRender {
         PartialError::File { path: self.path.clone(), source }
     }
 
-    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns a
-    /// film of the first samples if the file has all their tiles.
+    /// Writes the valid tiles of the file into the film, and truncates the file after the last valid tile.
+    /// Returns a film of the first samples if the file has all tiles of these samples.
     fn resume(&self, mut file: &File, film: &mut Film) -> Result<Option<Film>, PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
@@ -137,16 +137,16 @@ impl PartialRender {
         Ok(base)
     }
 
-    /// Checks that a file still has the head that was read first. A file with another head is another
-    /// picture's, and must not be truncated.
+    /// Checks that a file still has the head `head`. A file with another head belongs to another picture, and
+    /// must not be truncated.
     fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
         reader.rewind().map_err(|error| self.error(error))?;
         let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.checksum == head.checksum);
         is_same.then_some(()).ok_or_else(|| self.written_over("read"))
     }
 
-    /// Checks that a file being written still has this render's settings, whose checksum is `head`. Tiles
-    /// appended to the file of another picture would be lost.
+    /// Checks that the file still has the settings of this render, with the checksum `head`. Tiles appended
+    /// to the file of another picture would be lost.
     fn check_own(&self, mut file: &File, head: u32) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let found = read_head(&mut BufReader::new(file), &self.path)?;
@@ -172,7 +172,7 @@ impl PartialRender {
         };
         let mut write = || {
             let start = file.seek(SeekFrom::End(0))?;
-            // A single call: another process sees the tile whole or truncated.
+            // With a single call, another process sees the tile whole or truncated.
             file.write_all(&record(tile, self.first_sample, head))?;
             Ok(start)
         };
@@ -205,7 +205,7 @@ impl PartialRender {
         Ok(sum)
     }
 
-    /// Removes a file without tiles that cannot be written, because there is nothing to resume from.
+    /// Removes the file after a failed write if it has no tiles, because there is nothing to resume from.
     fn discard_empty(&self, kept: &mut KeptTiles) {
         if let Some(file) = kept.file.take_if(|_| !kept.holds_tiles) {
             // If the removal fails, the file is empty at least.
@@ -220,7 +220,7 @@ impl PartialRender {
         self.lock().holds_tiles
     }
 
-    /// Returns the first failure of writing a tile, once.
+    /// Returns the first failure of writing a tile. Each failure is returned once.
     ///
     /// # Errors
     /// If a write failed.
@@ -230,8 +230,8 @@ impl PartialRender {
         kept.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Removes the file after the picture is written. A file that this render did not open belongs to another
-    /// render, and stays.
+    /// Removes the file; called after the picture is written. A file that this render did not open belongs to
+    /// another render, and stays.
     ///
     /// # Errors
     /// If the file cannot be removed.

@@ -1,8 +1,8 @@
 //! Records of finished tiles in a partial render:
 //! `magic number | x, y, width, height | first sample, samples | pixels | CRC-32C`.
 //!
-//! The checksum also covers the checksum of the file's head. Records of another picture, which remain if a
-//! copy over this file was interrupted, are therefore invalid.
+//! The CRC-32C of a record also covers the checksum of the head of its file. If a copy of another file over
+//! this one was interrupted, the remaining records of this file are therefore invalid.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -20,14 +20,14 @@ use super::samples::{KeptSamples, SampleRange};
 /// Magic number of a record. As in PNG, a transfer that changes line ends or clears the eighth bit destroys
 /// it.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
-/// Size of a record before its pixels, bytes: magic number, position and size of the tile, and range of
+/// Number of bytes of a record before its pixels: magic number, position and size of the tile, and range of
 /// samples.
 pub(super) const HEAD_BYTES: usize = MAGIC.len() + 24;
 pub(super) const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of pixels of a tile, over all kinds of chips.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
-/// Maximum number of bytes that a reader may read in invalid tiles, in addition to the file's size: some
-/// hundred of the largest tiles. Without a limit, a hostile file would take hours.
+/// Maximum number of bytes that are read for invalid records, in addition to the size of the file: some
+/// hundred of the largest tiles. Without this limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
 /// Encodes the record of a finished tile. The tile's samples begin with number `first_sample`; `file` is the
@@ -59,8 +59,8 @@ pub(crate) fn record_bytes(tile: &Tile, format: &SumFormat) -> u64 {
     (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * format.record_bytes() as u64
 }
 
-/// Decodes the record of a tile with all samples of the format. `file` is the checksum of the file's head.
-/// `None` unless the record is complete, valid and of this tile.
+/// Decodes the record of the tile `tile` with all samples of `format`. `file` is the checksum of the file's
+/// head. Returns `None` if the record is incomplete, invalid or of another tile.
 pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -> Option<FinishedTile> {
     let (bytes, sum) = record.split_last_chunk::<CHECKSUM_BYTES>()?;
     let pixels = bytes.strip_prefix(&*head(tile, 0, format.samples))?;
@@ -68,9 +68,9 @@ pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -
     is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
-/// Reads all valid tiles from offset `start` on. `file` is the checksum of the file's head. Returns the end
-/// of the last valid tile. After invalid bytes the search continues at the next magic number. It stops when
-/// the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
+/// Reads all valid tiles from offset `start` on into `kept`, and returns the end of the last one. `file` is
+/// the checksum of the file's head. After invalid bytes the search continues at the next magic number. It
+/// ends when more bytes were read for invalid records than the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(
     reader: &mut BufReader<&File>,
     start: u64,
@@ -116,8 +116,8 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
             return Ok(None);
         }
         for (byte, count) in buffer.iter().zip(1..) {
-            // The first byte of the magic number does not recur in it: no other match can begin within a
-            // failed one.
+            // The first byte of the magic number occurs in it only once. After a mismatch, a match can
+            // therefore begin only at the current byte.
             matched = if *byte == MAGIC[matched] { matched + 1 } else { usize::from(*byte == MAGIC[0]) };
             if matched == MAGIC.len() {
                 reader.consume(count);
@@ -129,7 +129,7 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     }
 }
 
-/// Reads the record behind a magic number, at most `available` bytes, and writes its pixels into the film of
+/// Reads the record after a magic number, at most `available` bytes, and writes its pixels into the film of
 /// its samples. Returns the number of bytes read; `None` if the record is invalid.
 fn read_tile(
     reader: &mut impl Read,
@@ -166,8 +166,8 @@ fn read_tile(
     Ok(Some(behind_magic))
 }
 
-/// Decodes position and size of a tile, and its range of samples; `None` unless the tile is in the window and
-/// within a chip's budget, and the range is not empty.
+/// Decodes position and size of a tile, and its range of samples. Returns `None` if the tile is not inside
+/// the window, is too large for any chip, or if the range is empty.
 fn tile_at(bytes: &[u8], window: Window) -> Option<(Tile, SampleRange)> {
     let number = |index: usize| bytes.as_chunks().0.get(index).map(|bytes| u32::from_le_bytes(*bytes));
     let tile = Tile { id: 0, x: number(0)?, y: number(1)?, width: number(2)?, height: number(3)? };

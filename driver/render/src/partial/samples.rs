@@ -1,33 +1,33 @@
-//! Samples that a partial render has kept. Each range of samples has a film.
+//! Samples of a picture that the file of a partial render contains. Each range of sample numbers has a film.
 
 use photoncard_picture::film::{Film, Window};
 use photoncard_picture::sums::SumFormat;
 
-/// Maximum number of ranges in a file. Each is a pass of the picture.
+/// Maximum number of sample ranges that are read from a file. Each range is a pass of the picture.
 const MAX_RANGES: usize = 16;
 
-/// Range of sample numbers of a pixel.
+/// Range of sample numbers, equal for all pixels of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SampleRange {
     pub(super) first: u32,
     pub(super) count: u32,
 }
 
-/// Films of the ranges of samples in a partial render's file, for a picture that may have more samples.
+/// Films of the sample ranges in a partial render's file. The picture may have more samples than the file.
 pub(super) struct KeptSamples<'a> {
     /// Empty film of the picture.
     empty: &'a Film,
     ranges: Vec<(SampleRange, Film)>,
-    /// Greatest end of a range of samples in any record.
+    /// Greatest end of the sample ranges in all records of the file.
     most: u32,
 }
 
-/// Kept samples of a picture, divided into complete ones and others.
+/// Samples taken over from a file, divided into those that all pixels have and the remaining ones.
 pub(super) struct Split {
-    /// Complete film of the first samples; `None` if there are none, or if all samples of the picture are
-    /// complete.
+    /// Film of the first samples, which has all pixels. `None` if there are no such samples, or if they are
+    /// all samples of the picture.
     pub(super) base: Option<Film>,
-    /// Film of the remaining samples; `None` if none of their tiles is kept.
+    /// Film of the remaining samples, which may lack pixels; `None` if the file has none of their tiles.
     pub(super) rest: Option<Film>,
 }
 
@@ -45,8 +45,8 @@ impl<'a> KeptSamples<'a> {
         self.empty.window()
     }
 
-    /// Film of a range of samples; `None` if the picture does not have them, or there are too many ranges or
-    /// too little memory for another film.
+    /// Film of a range of samples, created if it does not exist. `None` if the picture does not have these
+    /// samples, there are too many ranges, or memory is too small for another film.
     pub(super) fn film_of(&mut self, samples: SampleRange) -> Option<&mut Film> {
         let end = samples.first.saturating_add(samples.count);
         self.most = self.most.max(end);
@@ -65,10 +65,10 @@ impl<'a> KeptSamples<'a> {
         self.ranges.get_mut(index).map(|(_, film)| film)
     }
 
-    /// Divides the kept samples into a complete film of the first ones and a film of the remaining ones.
+    /// Joins the complete ranges from sample 0 on to one film, and finds the film of all remaining samples.
     ///
     /// # Errors
-    /// The greatest number of samples in the file, if the picture can take over none of the samples.
+    /// The greatest end of a sample range in the file, if the picture can take over none of the samples.
     pub(super) fn split(mut self) -> Result<Split, u32> {
         let samples = self.format().samples;
         let mut base: Option<Film> = None;

@@ -16,7 +16,6 @@ const TILES: u32 = 6;
 /// Size of a tile's record, bytes.
 const RECORD_BYTES: usize = HEAD_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
 
-/// Film with `samples` samples per pixel.
 fn film_of(samples: u32) -> Film {
     let format = SumFormat { samples, ..SumFormat::ONE };
     Film::new(4 * TILES, 3, Window::full(4 * TILES, 3), format).unwrap()
@@ -108,8 +107,8 @@ fn damage_loses_only_the_tile_that_it_hits() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
-/// A tile of an outvoted card must not be taken over. Once another card has rendered the tile, it must be
-/// taken over with that card's pixels.
+/// A tile that an outvoted card has rendered must not be taken over, unless another card has rendered it
+/// again.
 #[test]
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -215,8 +214,8 @@ fn a_partial_file_is_locked_by_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-/// The appended records are heads of the largest tiles, without pixels. The reader reads and sums each in
-/// vain.
+/// The file is appended with heads of records of the largest tiles, without pixels. The reader computes the
+/// checksum of each in vain.
 #[test]
 fn a_hostile_file_is_read_quickly() {
     let folder = tempfile::tempdir().unwrap();
@@ -333,8 +332,8 @@ fn a_foreign_file_is_refused_and_unchanged() {
     }
 }
 
-/// Without `resume`, a file with tiles must neither be overwritten nor removed, whoever wrote it and
-/// whenever.
+/// Without `resume`, a file with tiles must be neither overwritten nor removed. It does not matter who wrote
+/// it, nor when.
 #[test]
 fn finished_tiles_are_not_lost_without_resume() {
     let folder = tempfile::tempdir().unwrap();
@@ -397,7 +396,7 @@ fn an_overwritten_file_gets_no_more_tiles() {
     }
 }
 
-/// A render takes unstated settings from the file, so that a damaged number would give a picture with two
+/// A resumed render takes unstated settings from the file. With a damaged number, the picture would mix two
 /// settings.
 #[test]
 fn damaged_settings_are_refused_and_unchanged() {
@@ -419,8 +418,8 @@ fn damaged_settings_are_refused_and_unchanged() {
     }
 }
 
-/// Copying another picture's file over this one was interrupted. The file then has the other settings, and
-/// tiles of both pictures.
+/// Copying the file of another picture over this one was interrupted. The file then has the settings of the
+/// other picture, and tiles of both.
 #[test]
 fn tiles_of_another_picture_are_not_taken_over() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,10 +1,10 @@
-//! Assignment of a picture's pixels to its parts, by a fixed rule, so that renders agree without
-//! communication.
+//! Assignment of a picture's pixels to its parts, by a fixed rule, so that renders on different machines
+//! agree without communication.
 //!
-//! The window is divided into square patches, which are numbered along a Hilbert curve. Each run of `N`
-//! patches has one patch for each of `N` parts, so that a part has patches all over the picture and costs
-//! about as much as any other. Runs assign parts in ascending and descending order alternately: because the
-//! curve is regular, a part would otherwise have the same positions in a pattern of the picture.
+//! The window is divided into square patches, which are numbered along a Hilbert curve. Of each `N`
+//! consecutive patches, each of `N` parts gets one. A part thus has patches all over the picture, and costs
+//! about as much as any other. Ascending and descending order of the parts alternate. Otherwise, because the
+//! curve is regular, a part could always get the same positions of a repeated pattern in the picture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,13 +15,13 @@ use photoncard_shared::message::Tile;
 
 /// Maximum number of parts of a picture.
 pub const MAX_PARTS: u32 = 1 << 16;
-/// Side of the patches if each part has many, pixels: the widest tile of a chip.
+/// Maximum side of patches, pixels: the widest tile of a chip.
 const WIDEST_PATCH: u32 = 64;
 /// Minimum side of patches, pixels: the side of the coarsest cells of irradiance records. Narrower patches
 /// would compute these records several times.
 const NARROWEST_PATCH: u32 = 16;
-/// Minimum number of patches per part, if the picture is large enough. With more patches, the costs of parts
-/// are more equal.
+/// Number of patches per part below which patches are halved, down to `NARROWEST_PATCH`. With more patches,
+/// the costs of parts are more equal.
 const PATCHES_OF_PART: u64 = 64;
 
 /// A part of a picture: number `number`, counted from 1, of `count` parts.
@@ -57,8 +57,8 @@ impl Part {
         deal(window, self.count).filter(|(part, _)| *part == self).map(|(_, patch)| patch).collect()
     }
 
-    /// Tiles of the part, numbered from 0, each with at most `side * side` pixels. No tile extends over
-    /// several patches.
+    /// Tiles of the part, numbered from 0, each with at most `side * side` pixels. Each tile lies in a single
+    /// patch.
     pub fn tiles(self, window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
         let of_patch = |Tile { x, y, width, height, .. }: Tile| {
             tiles(Window { x0: x, x1: x + width, y0: y, y1: y + height }, side, order)
@@ -84,7 +84,7 @@ impl FromStr for Part {
     }
 }
 
-/// Patches of a window along the Hilbert curve, each with its part, one of `count`.
+/// Patches of a window along the Hilbert curve, each with the part, of `count` parts, that it belongs to.
 pub(super) fn deal(window: Window, count: u32) -> impl Iterator<Item = (Part, Tile)> {
     let side = patch_side(window, count);
     let mut patches = tiles(window, side, GatherOrder::Tiled);
@@ -109,8 +109,8 @@ fn patch_side(window: Window, count: u32) -> u32 {
     std::iter::successors(Some(WIDEST_PATCH), narrower).last().unwrap_or(WIDEST_PATCH)
 }
 
-/// Index of a point on the Hilbert curve through a quarter of the plane. The point's coordinates are below
-/// 2^16.
+/// Index of a point along the Hilbert curve through a quadrant of the plane. The coordinates of the point are
+/// below 2^16.
 fn hilbert([mut x, mut y]: [u32; 2]) -> u64 {
     let mut place = 0;
     for level in (0..16).rev() {

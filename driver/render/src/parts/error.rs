@@ -85,7 +85,7 @@ pub enum PartError {
     Output(#[from] OutputError),
 }
 
-/// Text that names the first of some parts, and states the number of the others.
+/// Lists the first parts by name, and the number of the others.
 fn named(parts: &[Part]) -> String {
     const NAMED: usize = 8;
     let mut text = parts.iter().take(NAMED).map(Part::to_string).collect::<Vec<_>>().join(", ");

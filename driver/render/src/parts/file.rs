@@ -14,7 +14,6 @@ use super::error::{PartError, VERSION};
 use super::head::{PartHead, PartPicture};
 use crate::partial::records::{decode, record, record_bytes};
 
-/// Kind and version of the file.
 const KIND: Kind = Kind { name: "photoncard part", version: VERSION };
 
 /// Writes the file of the part `head.part`, whole or not at all. `film` has the pixels of the part.
@@ -33,7 +32,7 @@ pub fn write(path: &Path, head: &PartHead, film: &Film) -> Result<(), PartError>
     Ok(file.into_inner().map_err(|error| failed(error.into_error()))?.commit()?)
 }
 
-/// File of a part, with its head.
+/// File of a part that was opened, with its head.
 pub(super) struct PartFile {
     pub(super) path: PathBuf,
     pub(super) head: PartHead,
@@ -69,7 +68,7 @@ impl PartFile {
         Ok(Self { path: path.to_owned(), head, picture, checksum, bytes })
     }
 
-    /// Checks that the file is as long as its head and the records of `patches`, the part's patches.
+    /// Checks that the length of the file is that of its head plus the records of `patches`, its patches.
     ///
     /// # Errors
     /// If the file has another length.
@@ -83,8 +82,8 @@ impl PartFile {
         Err(PartError::Damaged { path: self.path.clone(), fault })
     }
 
-    /// Reads the `patches` of the part. The head is read again before and after them, so that an overwritten
-    /// file is detected.
+    /// Reads the `patches` of the part and passes them to `put`. The head is read again before and after
+    /// them, to detect that the file was overwritten.
     ///
     /// # Errors
     /// If the file is damaged, unreadable, or has changed since it was opened; and the errors of `put`.
@@ -109,7 +108,7 @@ impl PartFile {
         self.check_head(&mut reader)
     }
 
-    /// Checks that the file still begins with the head. Reads up to the head's end.
+    /// Checks that the file still begins with the same head. The reader is then at the end of the head.
     fn check_head(&self, reader: &mut BufReader<File>) -> Result<(), PartError> {
         reader.rewind().map_err(|source| PartError::Unreadable { path: self.path.clone(), source })?;
         match KIND.read::<PartHead>(reader) {

@@ -1,4 +1,4 @@
-//! Head of a part's file: the part, and everything about the picture except pixels.
+//! Head of a part's file: everything about the part and its picture except pixels.
 
 use photoncard_picture::film::{Film, FilmError, SumFormat, Window};
 use photoncard_picture::layer::Layers;
@@ -16,11 +16,11 @@ pub struct PartHead {
     /// Part that the file contains.
     #[serde(serialize_with = "write_part", deserialize_with = "read_part")]
     pub part: Part,
-    /// Provenance of the picture: everything that its pixels depend on, by option names.
+    /// Provenance of the picture: everything that its pixels depend on, as values by option names.
     pub settings: Map<String, Value>,
     /// Layers of the picture besides radiance, in the text form of [`Layers`].
     pub layers: String,
-    /// Arguments of the command that made the part.
+    /// Arguments of the command that rendered the part.
     pub command: Vec<String>,
     /// `f32::to_bits` of the units of the sums: radiance, W/(sr m^2), and depth, metres.
     pub units: [u32; 2],
@@ -40,7 +40,7 @@ impl PartHead {
         Self { part, settings, layers: layers.to_string(), command, units }
     }
 
-    /// Picture that the head describes; `None` if the settings do not state one.
+    /// Picture that the head describes; `None` if the head does not describe a possible picture.
     pub(super) fn picture(&self) -> Option<PartPicture> {
         let numbers = |name: &str| -> Option<Vec<u32>> {
             let numbers = self.settings.get(name)?.as_array()?.iter();
@@ -61,7 +61,7 @@ impl PartHead {
         is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
     }
 
-    /// Describes the settings in which two heads differ. `own` and `others` are the names of the heads.
+    /// Describes the settings in which two heads differ. `own` and `others` name the files of the two heads.
     pub(super) fn differences(&self, other: &Self, [own, others]: [&str; 2]) -> Vec<String> {
         let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
         let names = self

@@ -1,4 +1,4 @@
-//! Merges parts to the whole picture.
+//! Merges parts into the whole picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use super::error::PartError;
 use super::file::PartFile;
 use super::head::PartHead;
 
-/// Parts of one picture, in any order.
+/// Files of parts of one picture, in any order.
 pub struct Parts {
     files: Vec<PartFile>,
-    /// Patches of each part of the picture.
+    /// Patches of each part of the picture, whether or not its file is given.
     patches: BTreeMap<Part, Vec<Tile>>,
 }
 
@@ -63,13 +63,13 @@ impl Parts {
         self.patches.get(&file.head.part).map_or(&[], |patches| patches)
     }
 
-    /// Parts that none of the files contains.
+    /// Parts of the picture that none of the files contains.
     pub fn missing(&self) -> Vec<Part> {
         let found: BTreeSet<Part> = self.files.iter().map(|file| file.head.part).collect();
         self.patches.keys().filter(|part| !found.contains(part)).copied().collect()
     }
 
-    /// Head of the first file; `None` without files.
+    /// Head of the first file; `None` if there are no files.
     pub fn any(&self) -> Option<&PartHead> {
         self.files.first().map(|file| &file.head)
     }
@@ -93,7 +93,7 @@ impl Parts {
         let Some(PartFile { picture, head, .. }) = first else {
             return Err(PartError::Missing { count: self.patches.len() as u32, missing });
         };
-        // Every file is as long as its part: the film takes about as much memory as the files are long.
+        // The lengths of the files were checked: the film takes about as much memory as the files are long.
         let mut film = picture.film()?;
         let mut done: BTreeMap<Part, &PartFile> = BTreeMap::new();
         for file in &self.files {
@@ -119,7 +119,7 @@ fn take(file: &PartFile, patches: &[Tile], film: &mut Film) -> Result<(), PartEr
     file.read(patches, |patch| patch.sums().try_for_each(|((x, y), sums)| Ok(film.write(x, y, &sums)?)))
 }
 
-/// Checks that a part has the same pixels as the film, which were read from the file `first`.
+/// Checks that a part has the same pixels as the film, which come from the file `first`.
 fn compare(file: &PartFile, patches: &[Tile], film: &Film, first: &Path) -> Result<(), PartError> {
     file.read(patches, |patch| {
         let is_equal = film.finished(patch.tile()).is_some_and(|own| own.records() == patch.records());

@@ -11,8 +11,8 @@
 //! records of patches, as in a partial render
 //! ```
 //!
-//! Position and size of each record follow from the head. A file whose length differs from that stated by its
-//! head is refused. Files of the same part differ only in the recorded command.
+//! Positions and sizes of the records follow from the head. A file with another length than its head implies
+//! is refused. Files of the same part differ only in the recorded command.
 
 mod dealing;
 mod error;

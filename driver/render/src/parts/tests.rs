@@ -11,7 +11,6 @@ use super::*;
 
 const WINDOW: Window = Window { x0: 5, x1: 75, y0: 2, y1: 40 };
 
-/// Function that changes a head.
 type Change = fn(&mut PartHead);
 
 /// Film with distinct sums in all pixels.

@@ -15,9 +15,8 @@ use super::head::Head;
 use super::scene::PreparedScene;
 use crate::PROGRAM;
 
-/// Kind and version of the file.
 pub(super) const KIND: Kind = Kind { name: "photoncard prepared scene", version: VERSION };
-/// Alignment of the lines in the file, bytes: a page of memory, which is a multiple of a line.
+/// Alignment of the card image in the file, bytes: a page of memory, which is a multiple of a line.
 const PAGE: u64 = 4096;
 /// Maximum number of lines of a card image, because no card has more than 4 GiB of memory.
 const MAX_LINES: u32 = u32::MAX / LINE_BYTES as u32;
@@ -105,8 +104,8 @@ fn empty(count: u32) -> Result<Vec<Line>, OutOfMemory> {
     Ok(lines)
 }
 
-/// Reads lines into memory. Returns the CRC-32C of the bytes in memory, which later changes of the file do
-/// not affect.
+/// Reads lines into memory. Returns the CRC-32C of the lines as they are in memory, so that later changes of
+/// the file do not matter.
 fn read_lines(reader: &mut impl BufRead, count: u32, lines: &mut Vec<Line>) -> io::Result<u32> {
     let mut sum = Checksum::default();
     for _ in 0..count {

@@ -1,4 +1,4 @@
-//! Head of a prepared scene's file, which has everything but the card image.
+//! Head of a prepared scene's file: everything but the card image.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,7 +18,6 @@ use crate::renderer::Kept;
 use crate::work::Prepared;
 use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
 
-/// Head of a prepared scene's file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Head {
@@ -29,7 +28,7 @@ pub(super) struct Head {
     /// CRC-32C of the card image.
     pub(super) checksum: u32,
     cameras: Vec<StoredCamera>,
-    /// Position of the scene's origin in the coordinates of its file, metres.
+    /// Position of the origin of scene coordinates in the coordinates of the scene file, metres.
     offset: [f64; 3],
     /// Checksums of the scene, with and without cameras.
     scene: [String; 2],
@@ -39,7 +38,7 @@ pub(super) struct Head {
     max_distance: f32,
     caustics: Option<CausticGather>,
     paths: u64,
-    /// Views of frames, by frame number.
+    /// Cameras of the frames of an animation, by frame number.
     frames: BTreeMap<u32, StoredView>,
     notes: Map<String, Value>,
 }
@@ -66,10 +65,10 @@ impl Head {
         }
     }
 
-    /// Combines the head with the card image to the prepared scene.
+    /// Combines the head with the card image into the prepared scene.
     ///
     /// # Errors
-    /// If a camera, a distance or the offset is not possible, or the photons are for one camera.
+    /// If a camera, a gather distance or the offset is invalid, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
         let Self {
             cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..

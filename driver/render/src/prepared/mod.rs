@@ -1,5 +1,5 @@
-//! Prepared scenes: files with everything that pictures of a scene need. Renders of a prepared scene need not
-//! read a glTF file, run a pilot or trace photons.
+//! Prepared scenes: files with everything that pictures of a scene need. To render a prepared scene, no glTF
+//! file is read, no pilot is run and no photons are traced.
 //!
 //! ```text
 //! photoncard prepared scene 4\n

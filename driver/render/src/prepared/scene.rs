@@ -1,4 +1,4 @@
-//! A scene with everything that its pictures need.
+//! A prepared scene: card image, cameras and settings, which replace the scene file for renders.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ use crate::renderer::{Chosen, Kept, Renderer, Source};
 use crate::work::{BudgetCheck, Times};
 use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
-/// A scene with its photon map, as a card image, and the settings that the image depends on.
+/// A scene with its photon maps, packed as a card image, and the settings that the image depends on.
 pub struct PreparedScene {
-    /// Stand-in for the scene: cameras, offset, checksums, and whether the scene is specular.
+    /// Scene without geometry: cameras, offset, checksums, and whether the scene is specular.
     pub(super) scene: Scene,
     pub(super) photons: PhotonMaps,
     pub(super) integrator: Integrator,
     pub(super) kept: Kept,
-    /// Views of frames, by frame number.
+    /// Cameras of the frames of an animation, by frame number.
     pub(super) frames: BTreeMap<u32, View>,
     pub(super) notes: Map<String, Value>,
 }
@@ -33,8 +33,9 @@ pub(super) struct View {
 }
 
 impl PreparedScene {
-    /// Prepares a scene: packs it, lets `choose` determine photons and integrator, and traces photons. The
-    /// card image must fit cards with `budgets`. `notes` are the caller's, such as names of inputs.
+    /// Prepares a scene: packs it, calls `choose` for the settings of photons and integrator, and traces
+    /// photons. The card image must fit cards with `budgets`. `notes` are any data of the caller, such as
+    /// names of inputs.
     ///
     /// # Errors
     /// As [`Renderer::render_chosen`].
@@ -66,7 +67,7 @@ impl PreparedScene {
         Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
     }
 
-    /// Adds a frame with the cameras of `scene`. Returns false, and adds no frame, if anything but the
+    /// Adds frame `number` with the cameras of `scene`. Returns false, and adds no frame, if anything but the
     /// cameras differs from the prepared scene.
     pub fn add_frame(&mut self, number: u32, scene: &Scene) -> bool {
         let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
@@ -95,7 +96,7 @@ impl PreparedScene {
         &self.scene
     }
 
-    /// JSON given to [`Self::new`], such as names of inputs; stored unchanged.
+    /// Data of the caller that were given to [`Self::new`].
     pub fn notes(&self) -> &Map<String, Value> {
         &self.notes
     }
@@ -105,21 +106,21 @@ impl PreparedScene {
         self.kept.prepared.image.bytes()
     }
 
-    /// Replaces photons and integrator in settings by those that the scene was prepared for.
+    /// Returns the settings with photons and integrator replaced by those for which the scene was prepared.
     #[must_use]
     pub fn settings(&self, settings: RenderSettings) -> RenderSettings {
         let (photons, integrator) = (self.photons.clone(), self.integrator.clone());
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Creates a renderer with the card image. [`Renderer::render`] takes [`Self::scene`] or [`Self::frame`],
-    /// with settings from [`Self::settings`].
+    /// Creates a renderer with the card image. Pass [`Self::scene`] or [`Self::frame`] to
+    /// [`Renderer::render`], and settings from [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())
     }
 }
 
-/// Checks that photons are for all cameras of a scene.
+/// Checks that photons are traced for all cameras of a scene, not for one.
 fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     match photons_for {
         PhotonsFor::Scene | PhotonsFor::Auto => Ok(()),

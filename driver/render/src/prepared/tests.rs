@@ -63,8 +63,7 @@ fn a_prepared_scene_gives_the_same_pictures_as_its_scene() {
     }
 }
 
-/// The file of an open scene is overwritten in place, truncated and removed. Pictures must be those of the
-/// scene that was opened.
+/// The file is overwritten and truncated while the scene is open. Pictures must be those of the opened scene.
 #[test]
 fn later_changes_of_the_file_change_no_picture() {
     let folder = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ use super::level::{Finish, Level, Quality};
 use super::pilot::{Effort, SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::{Integrator, Observer, RenderError, RenderSettings};
 
-/// Settings chosen for a scene.
+/// Settings that pilot renders have chosen for a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// Number of samples per pixel.
@@ -21,48 +21,49 @@ pub struct Fit {
     pub photons: usize,
     /// Maximum number of photons in the caustic map.
     pub max_caustic_photons: usize,
-    /// Cameras for which photons are traced; never [`PhotonsFor::Auto`].
+    /// Cameras for which photons are traced: any, or the picture's; never [`PhotonsFor::Auto`].
     pub photons_for: PhotonsFor,
-    /// Number of gather rays of a pixel, and of an irradiance record.
+    /// Number of gather rays per irradiance record, and per pixel if irradiance is not interpolated.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
     pub shadow_rays: u32,
-    /// True if irradiance is interpolated; false if hardly any could be.
+    /// True if irradiance is interpolated between irradiance records.
     pub interpolates: bool,
-    /// Maximum error of interpolated irradiance; infinite if the quality's own error bound is small enough.
+    /// Maximum of the error bound of interpolated irradiance; infinite if the quality's own is small enough.
     pub max_irradiance_error: f32,
-    /// Adaptive threshold of the cost model for one sample of unit cost: `sqrt(M) / w`, W^(1/2)/(sr^(1/2) m),
-    /// with the median radiance `M` and the worth of accuracy `w`: a relative variance of 1 in a pixel is
-    /// worth the time of `w^2` samples.
+    /// Adaptive threshold that the cost model gives for one sample of cost 1: `sqrt(M) / w`,
+    /// W^(1/2)/(sr^(1/2) m). `M` is the median radiance of the lit pixels, and `w` the worth of accuracy: a
+    /// relative variance of 1 in a pixel counts as much as the time of `w^2` samples.
     pub unit_threshold: f64,
-    /// Adaptive threshold at which the pilot's pixels have 1.1 paths per sample after the probes,
-    /// W^(1/2)/(sr^(1/2) m); `None` if these paths do not at least halve the variance of direct light.
+    /// Adaptive threshold at which the pixels of the pilot have 1.1 paths per sample after the probes on
+    /// average, W^(1/2)/(sr^(1/2) m); `None` if the additional paths do not at least halve the variance of
+    /// direct light.
     pub spent_threshold: Option<f64>,
-    /// Numbers that the scene would need beyond the limits of the quality.
+    /// Numbers that the scene would need, where they exceed the limits of the quality.
     pub beyond: Beyond,
     /// Noise and errors that the pilot measured, from which the settings follow.
     pub measured: Measured,
 }
 
-/// Numbers that a scene would need, if they exceed the limits of a quality or of a time.
+/// Numbers that a scene would need, where they exceed the limits of a quality or of a time; `None` elsewhere.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beyond {
     /// Number of photons in the map.
     pub photons: Option<usize>,
-    /// Number of gather rays of a pixel, and of an irradiance record.
+    /// Number of gather rays per irradiance record, and per pixel without interpolation.
     pub gather_rays: Option<u32>,
-    /// Number of photons in the map within the limits of the quality, if the time allows fewer.
+    /// Number of photons needed within the limits of the quality, if the time allows fewer.
     pub photons_in_time: Option<usize>,
 }
 
-/// CPU time in which a picture is rendered.
+/// CPU time limit of a picture, and the properties of the picture that determine how it is spent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeOfPicture {
     /// Time limit times the number of threads, in seconds.
     pub cpu_seconds: f64,
     /// Number of pixels.
     pub pixels: f64,
-    /// Finish of the picture. A denoiser takes part of the time.
+    /// Finish of the picture. A denoiser takes a part of the time.
     pub finish: Finish,
 }
 
@@ -73,7 +74,7 @@ impl TimeOfPicture {
         if self.finish == Finish::Denoised { seconds } else { 0.0 }
     }
 
-    /// Maximum cost of the first [`SAMPLES_IN_TIME`] samples of a pixel, in the unit of
+    /// Cost that the time limit allows for the first [`SAMPLES_IN_TIME`] samples of a pixel, in the unit of
     /// [`COST_OF_SHADOW_RAY`].
     fn cost_of_pixel(&self) -> f64 {
         let of_render = SHARE_OF_SAMPLES * self.cpu_seconds - self.cpu_seconds_of_denoiser();
@@ -81,7 +82,7 @@ impl TimeOfPicture {
     }
 }
 
-/// Settings that the user stated. A fit does not change them.
+/// Flags of the settings that the user stated. A fit does not change these settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stated {
     /// True if the number of samples is stated.
@@ -115,15 +116,15 @@ impl Stated {
         adaptive: true,
     };
 
-    /// Returns whether any setting is left to a pilot. Three settings do not count: adaptive sampling, which
-    /// is off without a pilot; caustic photons, which only a short time limit changes; and photons of a
-    /// gather, which no pilot changes.
+    /// Returns whether a pilot is needed to choose settings. Three settings do not count: adaptive sampling,
+    /// which is off without a pilot; caustic photons, which only a short time limit changes; and the number
+    /// of photons of a gather, which no pilot changes.
     pub fn needs_fit(self) -> bool {
         Self { adaptive: true, caustic_photons: true, neighbors: true, ..self } != Self::ALL
     }
 }
 
-/// Noise and map errors that pilot renders show, and the gather rays that a pixel costs.
+/// Noise and photon map errors measured by pilot renders, and the number of gather rays per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Relative standard deviation of a sample caused by its position in the pixel.
@@ -132,19 +133,20 @@ pub struct Measured {
     pub shadow_ray: f64,
     /// Relative standard deviation of a sample caused by one gather ray.
     pub gather_ray: f64,
-    /// Relative root mean square error of means over 4x4 pixels with a map of a million photons.
+    /// Relative root mean square error that a map of a million photons causes in the mean of 4x4 pixels.
     pub million_photons: f64,
-    /// Ratio of the squared errors of a map for the camera and of one for any camera; `None` if the camera
-    /// uses most photons anyway, or the user stated for which cameras photons are.
+    /// Squared error of a photon map for the camera, divided by that of a map of as many photons for any
+    /// camera. `None` if the camera uses most photons anyway, or the user stated for which cameras photons
+    /// are.
     pub photons_for_camera: Option<f64>,
-    /// Gather rays cast per pixel, divided by the setting `gather_rays`: rays of irradiance records, and of
-    /// samples without interpolation.
+    /// Number of gather rays cast per pixel, divided by the setting `gather_rays`. It includes the rays of
+    /// irradiance records and of samples without interpolation.
     pub gather_rays_per_ray: f64,
 }
 
 impl Measured {
-    /// Ratio of a sample's standard deviation with `shadow_rays` shadow rays to that with the pilot's number,
-    /// caused by position and shadow rays alone; 1 without noise.
+    /// Standard deviation of a sample with `shadow_rays` shadow rays, divided by that with the greater number
+    /// of the pilot; 1 without noise. Only the noise of positions and shadow rays counts.
     fn deviation_by(&self, shadow_rays: u32) -> f64 {
         let of_rays = |rays: u32| if rays == 0 { 0.0 } else { self.shadow_ray.powi(2) / f64::from(rays) };
         let variance = |rays: u32| self.place.powi(2) + of_rays(rays);
@@ -153,78 +155,81 @@ impl Measured {
     }
 }
 
-/// Maximum ratio of squared errors at which photons are traced for the camera. It is well below 1, because
-/// the ratio of two pilots is uncertain by a third.
+/// Maximum of `Measured::photons_for_camera` at which photons are traced for the camera. It is well below 1,
+/// because the measured ratio is uncertain by a third.
 const MAX_RATIO_FOR_CAMERA: f64 = 0.6;
-/// Fraction of samples with a Lambertian part below which nothing is interpolated.
+/// Minimum fraction of the samples with gather rays that see a surface with a Lambertian part. Below it
+/// nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
 /// Range of the number of shadow rays per sample.
 const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
-/// CPU time of a shadow ray relative to a sample without its rays to lights, as measured in rooms and halls.
+/// Cost of a shadow ray: its CPU time, divided by that of a sample without shadow rays, in rooms and halls.
 const COST_OF_SHADOW_RAY: f64 = 0.4;
-/// CPU time of a gather ray with its gather, in the unit of [`COST_OF_SHADOW_RAY`].
+/// Cost of a gather ray and the photon gather at its end, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_GATHER_RAY: f64 = 1.2;
-/// CPU time of tracing and storing a photon, in the unit of [`COST_OF_SHADOW_RAY`].
+/// Cost of tracing and storing a photon, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_PHOTON: f64 = 2.5;
-/// Minimum and maximum of the threshold of adaptive sampling, relative to that of the cost model.
+/// Minimum and maximum of the adaptive threshold, as multiples of the cost model's threshold.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
-/// Minimum of [`Variances::gather_rays_per_ray`], because the surveyed tiles may miss samples that gather.
+/// Minimum of [`Variances::gather_rays_per_ray`] in costs. The measured value may be too small, because the
+/// surveyed tiles may miss samples that gather.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
-/// Weight of the variance of gather rays if several records are interpolated.
+/// Factor of the variance of gather rays if irradiance is interpolated between several records.
 const WEIGHT_OF_RECORDS: f64 = 0.5;
-/// Weight of the map's squared error in 4x4 pixels. It is above 1, because the error is not noise of single
-/// pixels but a blotch.
+/// Factor of the squared error of the photon map in 4x4 pixels. It is above 1, because the error appears as a
+/// blotch and not as noise of single pixels.
 const WEIGHT_OF_MAP: f64 = 6.0;
-/// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. Few parts of the scene then have most of the
-/// photons, and each brings light to a large part of the picture: blotches are wide, and the pilot's map of
-/// few photons, which is guided less, shows a third of their squared error.
+/// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. Most of its photons are then in few places of
+/// the scene, each of which lights a large part of the picture, so that blotches are wide. The pilot's small
+/// map is guided less, and shows only a third of their squared error.
 const WEIGHT_OF_GUIDED_MAP: f64 = 8.0 * WEIGHT_OF_MAP;
-/// Minimum number of photons per triangle, up to [`MOST_FOR_TRIANGLES`] in all. A map whose photons are
-/// farther apart than the size of the furniture makes a room too dark, a bias that the pilot does not
+/// Minimum number of photons per triangle. The total minimum is at most [`MOST_FOR_TRIANGLES`]. If photons
+/// are farther apart than the furniture is large, a room becomes too dark, a bias that the pilot does not
 /// measure.
 const PHOTONS_OF_TRIANGLE: usize = 8;
 const MOST_FOR_TRIANGLES: usize = 1_000_000;
-/// Allowed error of 4x4 pixels by the photon map, relative to the aimed noise of the picture. The error of
-/// single pixels is up to twice as large.
+/// Maximum error of 4x4 pixels caused by the photon map, divided by the requested noise of the picture. The
+/// error of single pixels is up to twice as large.
 const SHARE_OF_MAP: f64 = 0.25;
-/// Allowed error of interpolated irradiance by the rays of its records, relative to the aimed noise of the
-/// picture.
+/// Maximum error of interpolated irradiance caused by the gather rays of its records, divided by the
+/// requested noise of the picture.
 const SHARE_OF_RECORDS: f64 = 0.5;
-/// Error bound of interpolated irradiance relative to the aimed noise of the picture. The error is then about
-/// half of the noise where small objects cover few pixels.
+/// Error bound of interpolated irradiance, divided by the requested noise of the picture. Where small objects
+/// cover few pixels, the error is then about half of the noise.
 const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
-/// Maximum number of photons for an aimed noise. [`MAX_RAYS_OF_RECORD`] is the maximum number of rays of a
-/// record.
+/// Maximum number of photons for a requested noise. [`MAX_RAYS_OF_RECORD`] is the maximum number of gather
+/// rays per irradiance record.
 const MAX_PHOTONS: usize = 16_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 /// Number of photons that a thread traces and stores in a second, as measured in furnished rooms.
 const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
-/// CPU seconds of a sample of cost 1, the unit of [`COST_OF_SHADOW_RAY`], as measured in furnished rooms.
+/// CPU seconds per unit of cost ([`COST_OF_SHADOW_RAY`]), as measured in furnished rooms.
 const SECONDS_OF_COST: f64 = 6e-6;
-/// CPU seconds of a denoiser that follows the render, and of each denoised pixel.
+/// CPU seconds of a denoiser, plus `SECONDS_OF_DENOISED_PIXEL` for each pixel.
 const SECONDS_OF_DENOISER: f64 = 0.25;
 const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
 /// Fraction of a picture's time for its first [`SAMPLES_IN_TIME`] samples and a denoiser.
 const SHARE_OF_SAMPLES: f64 = 0.5;
-/// Number of samples per pixel that every time limit should allow. With fewer samples, the time that is left
-/// when no further whole pass fits would be a large part of the limit.
+/// Number of samples per pixel that every time limit should allow. With fewer samples, the time that remains
+/// after the last whole pass would be a large part of the limit.
 const SAMPLES_IN_TIME: f64 = 4.0;
-/// Minimum ratio of the number of photons that a time allows to that of caustic photons.
+/// Number of photons that a time limit allows, divided by the maximum number of caustic photons.
 const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
-/// Minimum number of rays of a record in a short time, unless the fit has fewer. If fewer fit into the time,
-/// nothing is interpolated.
+/// Minimum number of gather rays per irradiance record under a time limit, unless the fit has fewer. If the
+/// time allows less than this minimum, nothing is interpolated.
 const MIN_RAYS_IN_TIME: u32 = 128;
-/// Minimum CPU time of a picture for the full pilot, seconds. In a furnished room the pilot takes six.
+/// Time limit of a picture below which the pilot does less work, CPU seconds. The full pilot takes six in a
+/// furnished room.
 const SECONDS_FOR_FULL_PILOT: f64 = 60.0;
-/// Number of photons that any time allows.
+/// Number of photons that even the shortest time limit allows.
 const MIN_PHOTONS_IN_TIME: usize = 50_000;
 
 impl Fit {
-    /// Adjusts the settings for a picture that gets samples until its noise, relative to the mean pixel, is
-    /// `noise`. Photons and rays of irradiance records are increased if errors that samples do not reduce
-    /// would otherwise exceed their share of the noise.
+    /// Adjusts the fit for a picture that is sampled until its noise, relative to its mean, is `noise`.
+    /// Raises photons and gather rays of irradiance records, because more samples do not reduce the errors
+    /// that these cause, and limits the error bound of interpolation.
     pub fn for_noise(self, noise: f64) -> Self {
         let Measured { gather_ray, million_photons, .. } = self.measured;
         let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
@@ -246,12 +251,12 @@ impl Fit {
         }
     }
 
-    /// Adjusts the settings for a picture that gets samples until a time is over, with the stated settings of
-    /// `integrator`. The photon map takes about a quarter of the time at most, or has 50,000 photons; the
+    /// Adjusts the fit for a picture that is sampled until a time limit, with the stated settings of
+    /// `integrator`. The photon map takes at most about a quarter of the time, or has 50,000 photons. The
     /// caustic map has at most an eighth of the number of photons that the time allows. Four samples of each
-    /// pixel and the denoiser take about half of the time at most. Irradiance records have as many rays as
-    /// fit in. If these are too few, nothing is interpolated unless the number of gather rays is stated, and
-    /// each sample has the gather rays that fit in, at least one.
+    /// pixel and the denoiser take at most about half of the time. Irradiance records have as many rays as
+    /// the time allows. If it allows too few and the number of gather rays is not stated, nothing is
+    /// interpolated. Each sample then has the gather rays that the time allows, at least one.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
         let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
@@ -283,8 +288,8 @@ impl Fit {
         }
     }
 
-    /// Applies the fit to settings, except for stated ones. If the number of samples is stated, samples share
-    /// the shadow rays of a pixel and, without a cache, its gather rays.
+    /// Writes the fit into the settings that are not stated. The shadow rays of a pixel and, without an
+    /// irradiance cache, its gather rays are divided among its samples, even if their number is stated.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
         let RenderSettings { photons, integrator, .. } = settings;
         if !stated.samples {
@@ -318,11 +323,11 @@ impl Fit {
         }
     }
 
-    /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within
-    /// [`FACTORS_OF_THRESHOLD`] of the cost model's threshold. The model gives each pixel
-    /// `n = w s sqrt(1 / c)` paths, where `w` is the worth of accuracy, `s` the pixel's standard deviation
-    /// over the square root of its radiance, and `c` the cost of a path. `None` if all samples are probes, or
-    /// noise is too uniform for a gain.
+    /// Threshold of adaptive sampling: [`Self::spent_threshold`], scaled to the picture's number of shadow
+    /// rays and limited to [`FACTORS_OF_THRESHOLD`] times the cost model's threshold. `None` if all samples
+    /// are probes, or noise is too uniform for a gain. The model gives each pixel `n = w s sqrt(1 / c)`
+    /// paths, where `w` is the worth of accuracy, `s` the pixel's standard deviation over the square root of
+    /// its radiance, and `c` the cost of a path.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
@@ -336,10 +341,10 @@ impl Fit {
 }
 
 impl Quality {
-    /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
-    /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
-    /// Seed, cards, threads and crop window have no effect on the result. The pilot does less work for
-    /// [`Self::Draft`], and for a time limit of less than 60 CPU seconds.
+    /// Chooses the settings of this quality that depend on the scene, by pilot renders with the view, filter
+    /// and sampling in `settings`. Returns `None` if no setting depends on the scene. Seed, cards, threads
+    /// and crop window have no effect on the result. The pilot does less work for [`Self::Draft`], and if the
+    /// time limit of the picture is below 60 CPU seconds.
     ///
     /// # Errors
     /// As [`render`](crate::render).
@@ -372,7 +377,7 @@ struct Pictured {
 }
 
 impl Level {
-    /// Chooses the settings with the least sum of time and variance for the variances of a scene.
+    /// Chooses the settings that minimise the sum of time and weighted variance in a scene.
     ///
     /// With `n` samples, rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum
     /// `c n + w^2 v / n` is least for `n = w sqrt(v / c)`, where `w` is the worth of accuracy.
@@ -431,7 +436,7 @@ impl Level {
     }
 }
 
-/// Smallest multiple of `step` that is at least `number`, within bounds; the maximum for NaN.
+/// Rounds `number` up to a multiple of `step`, and clamps it to the bounds. Returns the maximum for NaN.
 fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
     if number.is_nan() {
         return *bounds.end();
@@ -440,12 +445,12 @@ fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
     steps.saturating_mul(step).clamp(*bounds.start(), *bounds.end())
 }
 
-/// Rounds a positive number to two digits.
+/// Rounds a positive number to two significant digits.
 fn two_digits(number: f64) -> f32 {
     format!("{number:.1e}").parse().unwrap_or(f32::NAN)
 }
 
-/// Number of photons within bounds, rounded up to two digits; the maximum if `number` is not finite.
+/// Clamps a number of photons, and rounds it up to two significant digits; the maximum if it is not finite.
 fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
     let finite = if number.is_finite() { number } else { *bounds.end() as f64 };
     let bounded = finite.clamp(*bounds.start() as f64, *bounds.end() as f64) as usize;
@@ -491,7 +496,7 @@ mod tests {
         time + Quality::Good.level(Finish::Rendered).unwrap().worth.powi(2) * variance
     }
 
-    /// Numbers within the limits of the quality are the best to a factor of 1.4, which covers rounding.
+    /// Each chosen number has a smaller loss than 0.7 and 1.4 times the number, a margin for rounding.
     #[test]
     fn fitted_settings_minimise_time_plus_weighted_variance() {
         let (fit, level) = (good(&VARIANCES), Quality::Good.level(Finish::Rendered).unwrap());
@@ -596,8 +601,8 @@ mod tests {
         assert_eq!(caustics(&short, false), Some(short.photons / 8));
     }
 
-    /// Fit of [`PICTURED`] for a time limit of which half suffices for the cost `costs` of each pixel, in
-    /// units of 6 microseconds, and for the denoiser.
+    /// Adjusts `fit` to a time limit of [`PICTURED`]. Half of the limit suffices for the denoiser and for the
+    /// cost `costs` of each pixel, in units of 6 microseconds.
     fn in_time(fit: Fit, costs: f64, finish: Finish, stated: Stated) -> Fit {
         let pixels = PICTURED.pixels;
         let of_denoiser = TimeOfPicture { cpu_seconds: 0.0, pixels, finish }.cpu_seconds_of_denoiser();
@@ -653,7 +658,7 @@ mod tests {
         assert_eq!((fit.interpolates, fit.gather_rays), (true, 401));
     }
 
-    /// Without records, pixels do not share rays, so that equal costs allow more rays.
+    /// Without irradiance records, pixels do not share gather rays, so that equal costs allow more rays.
     #[test]
     fn pixels_without_records_take_more_rays_for_equal_costs() {
         let level = Quality::Good.level(Finish::Rendered).unwrap();

@@ -1,4 +1,4 @@
-//! Takes over settings of kept samples, for a render that adds to them.
+//! Takes over the settings of samples that an earlier render has stored, for a render that adds to them.
 
 use photoncard_map::photon_map::PhotonsFor;
 use photoncard_picture::choice::Choice;
@@ -8,10 +8,10 @@ use super::Stated;
 use crate::{NamedSettings, RenderSettings};
 
 impl Stated {
-    /// Copies into `settings` the values that a quality may have chosen for the kept samples of a picture,
-    /// and the planned number of samples, except for stated settings. `kept` has them by option names. A
-    /// value that is not a valid setting is ignored, because a render compares all settings with those of the
-    /// samples anyway.
+    /// Copies the settings of stored samples into `settings`, so that more samples can be added to the
+    /// picture. It copies the values that a quality may have chosen and the planned number of samples, but
+    /// none that the user stated. `kept` has the values by option names. An invalid value is ignored, because
+    /// a render compares all settings with those of the samples anyway.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
         let count = |name: &str| number(name).and_then(|count| u32::try_from(count).ok());
@@ -38,8 +38,8 @@ impl Stated {
         if !self.shadow_rays {
             integrator.shadow_rays = count("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
-        // The error bound is the quality's own, or smaller if little noise was aimed at. The scene determines
-        // only whether irradiance is interpolated.
+        // The stored error bound is the quality's own, or smaller if the user asked for little noise. The
+        // scene determines only whether irradiance is interpolated.
         if !self.cache
             && let Some(kept) = kept.get("ic-error")
         {

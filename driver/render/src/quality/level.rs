@@ -1,4 +1,4 @@
-//! Qualities: worth of accuracy, limits, and settings for an unknown scene.
+//! Parameters of each quality: worth of accuracy relative to time, limits, settings for an unknown scene.
 
 use std::ops::RangeInclusive;
 
@@ -20,14 +20,14 @@ pub enum Quality {
     Paper,
 }
 
-/// Finish of a picture: whether a denoiser follows the render, for which a quality has other settings.
+/// Finish of a picture: whether a denoiser follows the render. The settings of a quality depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// The picture is shown as it is.
     #[default]
     Rendered,
-    /// A denoiser removes the noise that each pixel has of its own. Fewer samples and rays suffice. Nothing
-    /// is interpolated, because the denoiser would take errors that neighbouring pixels share for light.
+    /// A denoiser removes noise that is independent in each pixel; fewer samples and rays suffice. Nothing is
+    /// interpolated, because the denoiser would take errors that neighbouring pixels share for light.
     Denoised,
 }
 
@@ -48,30 +48,30 @@ choices!(Quality {
 /// Number of photons that a gather searches for. Fewer photons blur less and take less time, and with 24 the
 /// noise of gather rays still dominates.
 const NEIGHBORS: u32 = 24;
-/// [`NEIGHBORS`] in a picture that is denoised: it has fewer gather rays, whose noise dominates more.
+/// [`NEIGHBORS`] for a denoised picture, which has fewer gather rays, so that their noise dominates more.
 const NEIGHBORS_OF_DENOISED: u32 = 12;
 
-/// Parameters of a quality whose settings depend on the scene: the worth of accuracy, and limits of the
-/// settings chosen by it.
+/// Parameters of a quality whose settings depend on the scene: the worth of accuracy relative to time, and
+/// limits of the settings.
 pub(super) struct Level {
-    /// Worth of accuracy, `w` in [`Self::fit`]: a relative variance of 1 in a pixel is worth the time of
-    /// `w^2` samples.
+    /// Worth of accuracy, `w` in [`Self::fit`]. A relative variance of 1 in a pixel counts as much as the
+    /// time of `w^2` samples.
     pub(super) worth: f64,
     /// Range of the number of samples per pixel.
     pub(super) samples: RangeInclusive<u32>,
-    /// Range of the number of gather rays of a pixel, and of an irradiance record.
+    /// Range of the number of gather rays per irradiance record, and per pixel without interpolation.
     pub(super) gather_rays: RangeInclusive<u32>,
     /// Range of the number of photons in the map.
     pub(super) photons: RangeInclusive<usize>,
     /// Number of photons in the caustic map.
     caustic_photons: usize,
-    /// Error bound of interpolated irradiance; `None` if each sample gathers.
+    /// Relative error bound of interpolated irradiance; `None` if every sample casts gather rays.
     irradiance_error: Option<f32>,
 }
 
 impl Level {
-    /// Level of a picture that is denoised: half the worth of accuracy and half the samples, an eighth of a
-    /// pixel's gather rays, and no interpolation.
+    /// Level for a picture that is denoised. It has half the worth of accuracy, half the samples, an eighth
+    /// of the gather rays of a pixel, and no interpolation.
     fn denoised(self) -> Self {
         let share = |range: RangeInclusive<u32>, divisor| range.start() / divisor..=range.end() / divisor;
         Self {
@@ -120,8 +120,8 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality for an unknown scene. In place of what [`Self::fit`] chooses, they have the
-    /// fewest samples, four shadow rays, and middle numbers of gather rays and photons.
+    /// Settings of this quality for an unknown scene, without a pilot. They have the fewest samples of the
+    /// quality, four shadow rays, and the geometric mean of its limits for photons and gather rays.
     pub fn settings(self) -> RenderSettings {
         self.settings_for(Finish::Rendered)
     }

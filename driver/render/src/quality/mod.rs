@@ -1,7 +1,7 @@
-//! Qualities of a picture: settings for its purpose.
+//! Qualities of a picture: sets of settings for a purpose, such as a draft.
 //!
-//! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]) of few pixels, with
-//! photon maps of few photons.
+//! [`Quality::fit`] finds the settings that depend on the scene. It renders few pixels with few photons as a
+//! pilot.
 
 mod fit;
 mod kept;

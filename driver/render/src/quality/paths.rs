@@ -1,34 +1,33 @@
-//! Predicts the number of paths that adaptive sampling would take, from the deviations of a pilot's pixels.
+//! Predicts how many paths adaptive sampling would trace, from the deviations of a pilot render's pixels.
 
 use photoncard_shared::message::MAX_PATHS;
 
-/// Mean number of paths beyond one, per sample after the probes, to which adaptive sampling is tuned. It
-/// about minimises time times variance in rooms, halls and single objects. With two to three times as many,
-/// this product is 1.2 times as large in halls and Cornell boxes, and a fifth smaller in pictures where few
-/// pixels have nearly all noise.
+/// Mean number of paths beyond the first, per sample after the probes, that determines the threshold of
+/// adaptive sampling. This value about minimises time times variance in rooms, halls and single objects. With
+/// two to three times as many, the product is 1.2 times as large in halls and Cornell boxes, and a fifth
+/// smaller in pictures where few pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
-/// Minimum gain, [`Deviations::gain`], at which adaptive sampling is on. Deviations estimated from two
-/// samples make even uniform noise seem uneven, with a gain of 1.3 to 1.5. The gain is 1.5 to 2.2 in Cornell
-/// boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half
-/// or less.
+/// Minimum of [`Deviations::gain`] at which adaptive sampling is on. Deviations estimated from two samples
+/// make even uniform noise seem uneven, with a gain of 1.3 to 1.5. The gain is 1.5 to 2.2 in Cornell boxes
+/// and halls, where time times variance hardly changes. It is 2.2 to 4 in scenes where that product falls to
+/// a half or less.
 const MIN_GAIN: f64 = 2.0;
-/// Minimum and maximum of the thresholds that are tried.
+/// Lower and upper bound of the threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m).
 const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
-/// Number of bisections of the logarithm of the threshold.
+/// Number of steps of the bisection that finds the threshold on a logarithmic scale.
 const STEPS: u32 = 60;
 
-/// Deviations of the samples of some pixels: standard deviation divided by the square root of the radiance,
-/// W^(1/2)/(sr^(1/2) m).
+/// Deviation of the samples of each pixel: standard deviation divided by the square root of the mean
+/// radiance, W^(1/2)/(sr^(1/2) m).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Deviations(Vec<f64>);
 
 impl Deviations {
-    /// Deviations of no pixels.
     #[cfg(test)]
     pub(super) const NONE: Self = Self(Vec::new());
 
-    /// Computes the deviations of pixels. Each has the light of `N` samples, as probes would see it, and its
-    /// mean radiance.
+    /// Computes the deviation of each pixel from the light of `N` samples, whose variance probes would
+    /// measure, and the mean radiance. A deviation that is not finite becomes 0.
     pub(super) fn new<const N: usize>(pixels: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
         let of_pixel = |(light, radiance): ([f64; N], f64)| {
             let mean = light.iter().sum::<f64>() / N as f64;
@@ -39,14 +38,14 @@ impl Deviations {
         Self(pixels.into_iter().map(of_pixel).collect())
     }
 
-    /// Mean number of paths beyond one, per sample after the probes, at a threshold.
+    /// Mean number of additional paths, beyond the first, per sample after the probes at this threshold.
     fn extra_paths(&self, threshold: f64) -> f64 {
         let extra = |deviation: &f64| paths(*deviation, threshold) - 1.0;
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
     }
 
-    /// Ratio of the variances of all pixels with one path per sample and with the paths at a threshold; 1
-    /// without variance.
+    /// Sum of the variances of all pixels with one path per sample, divided by the sum with the paths at this
+    /// threshold; 1 without variance.
     fn gain(&self, threshold: f64) -> f64 {
         let by_one: f64 = self.0.iter().map(|deviation| deviation.powi(2)).sum();
         let by_paths: f64 =
@@ -55,15 +54,14 @@ impl Deviations {
         if gain.is_finite() { gain } else { 1.0 }
     }
 
-    /// Threshold at which samples after the probes have [`EXTRA_PATHS`] paths beyond one; `None` if the gain
-    /// is below [`MIN_GAIN`].
+    /// Threshold of adaptive sampling at which samples after the probes have [`EXTRA_PATHS`] additional paths
+    /// on average; `None` if the gain is below [`MIN_GAIN`].
     pub(super) fn worthy_threshold(&self) -> Option<f64> {
         let threshold = self.threshold();
         (self.gain(threshold) >= MIN_GAIN).then_some(threshold)
     }
 
-    /// Threshold at which samples after the probes have [`EXTRA_PATHS`] paths beyond one, limited to
-    /// [`THRESHOLDS`].
+    /// Threshold as in `Self::worthy_threshold`, whatever the gain, limited to [`THRESHOLDS`].
     fn threshold(&self) -> f64 {
         let [mut low, mut high] = THRESHOLDS;
         for _ in 0..STEPS {
@@ -78,7 +76,7 @@ impl Deviations {
     }
 }
 
-/// Number of paths per sample after the probes of a pixel with this deviation.
+/// Number of paths of a sample after the probes, in a pixel with this deviation, at this threshold.
 fn paths(deviation: f64, threshold: f64) -> f64 {
     (deviation / threshold).round().clamp(1.0, MAX_PATHS.into())
 }

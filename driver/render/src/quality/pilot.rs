@@ -1,4 +1,4 @@
-//! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
+//! Pilot renders: small tiles spread over the picture, rendered on emulated chips to measure noise.
 
 use std::ops::RangeInclusive;
 
@@ -18,75 +18,76 @@ use crate::emulator::EmulatedKind;
 use crate::emulator::direct::{RenderedTile, render_tiles_apart};
 use crate::{Observer, Phase, RenderError, RenderSettings, Sampling};
 
-/// Grid of tiles in which noise is measured. Each tile has a hashed position in its cell.
+/// Grid of tiles in which noise is measured. Each tile has a pseudo-random position in its cell.
 const SPREAD: Grid = Grid { cells: 8, side: 4 };
-/// Grid of tiles in which irradiance records are placed. The tiles are large, because tiles do not share the
-/// records at their borders.
+/// Grid of tiles in which the gather rays of irradiance records are counted. The tiles are large, because
+/// tiles do not share the records at their borders.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Fraction of an unguided map's photons that the picture can use, below which maps guided towards the camera
+/// Maximum fraction of an unguided map's photons that the picture uses, at which maps guided to the camera
 /// are tried. In rooms, halls and Cornell boxes, where guiding gains nothing, the fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
-/// Range of the used fraction of an unguided map's photons in which the short pilot estimates the error of a
-/// guided map. Below it the picture uses less than a hundred of the pilot's photons; above it guiding may
-/// gain nothing.
+/// Range of the fraction of an unguided map's photons that the picture uses, in which the short pilot
+/// estimates the error of a guided map instead of measuring it. Below it the picture uses less than a hundred
+/// of the pilot's photons; above it guiding may gain nothing.
 const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.1;
-/// Ratio of the squared errors of a guided and of an unguided map, over the fraction of the unguided photons
-/// that the picture uses. It is above 1, because guided photons differ in power.
+/// Factor `c` in the estimate `c f E` of the squared error of a guided map. `E` is the squared error of an
+/// unguided map, and `f` the fraction of its photons that the picture uses. `c` is above 1, because guided
+/// photons differ in power.
 const ERROR_BY_USED_SHARE: f64 = 2.0;
-/// Ratio of the numbers of photons of the larger and the smaller map.
+/// Number of photons of the pilot's larger map, divided by that of the smaller map.
 const MORE: usize = 4;
-/// Seeds of a pair of renders and of their photons. They differ from the picture's seed, on which settings
-/// must not depend.
+/// Seeds of the two renders of a pair. They and `PHOTON_SEED` differ from the picture's seed, on which the
+/// chosen settings must not depend.
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
 const PHOTON_SEED: u32 = 0x5eed_0003;
 /// Minimum side of the picture, pixels. In a smaller picture tiles would overlap.
 const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
-/// Numbers of shadow rays that are compared.
+/// Numbers of shadow rays per sample of the renders whose noise is compared.
 pub(super) const SHADOW_RAYS: [u32; 2] = [1, 4];
 
-/// Work of a pilot.
+/// Amount of work of a pilot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Effort {
     /// Number of photons of the smaller map.
     few_photons: usize,
-    /// Numbers of gather rays that are compared.
+    /// Numbers of gather rays per sample of the renders whose noise is compared.
     gather_rays: [u32; 2],
-    /// True if guided maps are rendered even where their errors can be estimated. Guiding takes most of a
-    /// pilot's time.
+    /// True if the error of a guided map is always measured, even where it could be estimated. Guiding takes
+    /// most of a pilot's time.
     measures_guided: bool,
 }
 
 impl Effort {
     pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32], measures_guided: true };
-    /// Half of the photons, three quarters of the gather rays and few guided maps, for pictures of which the
-    /// full pilot would take too large a part. Settings are less certain. Gather points with fewer than eight
-    /// rays would be sampled in another way.
+    /// Effort with half of the photons, three quarters of the gather rays and few guided maps, for drafts and
+    /// short time limits. The chosen settings are less certain. Eight gather rays are the minimum, because
+    /// gather points with fewer are sampled in another way.
     pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24], measures_guided: false };
 }
 
-/// Variances and errors from which the settings follow, relative to the radiance of the pixels.
+/// Variances and errors from which the settings follow, relative to the squared radiance of the pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
-    /// Variance of a sample caused by its position, at edges and textures in a pixel. It is a lower bound,
-    /// because stratification makes the variance with `n` rays less than `v / n`.
+    /// Variance of a sample caused by its position, at edges and textures in a pixel. It is a lower bound:
+    /// the variance `v / n` that is subtracted for `n` rays is too great if the rays are stratified.
     pub(super) place: f64,
     /// Variance of a sample caused by one shadow ray.
     pub(super) shadow_ray: f64,
     /// Variance of a sample caused by one gather ray.
     pub(super) gather_ray: f64,
-    /// Mean squared error in the light of 4x4 pixels, extrapolated to a map of one photon by the law `1 / N`.
+    /// Mean squared error of a map of one photon in 4x4 pixels, extrapolated by the law `1 / N`.
     pub(super) photon: f64,
-    /// Errors of photon maps for the camera; `None` if the camera uses most photons anyway, or the user
+    /// Errors of photon maps guided to the camera; `None` if the camera uses most photons anyway, or the user
     /// stated for which cameras photons are.
     pub(super) for_camera: Option<ForCamera>,
-    /// Fraction of the samples that see a surface with a Lambertian part.
+    /// Fraction of the samples with gather rays that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
-    /// Gather rays cast per pixel, divided by the setting `gather_rays`: rays of irradiance records, and of
-    /// samples without interpolation.
+    /// Number of gather rays cast per pixel, divided by the setting `gather_rays`. It includes the rays of
+    /// irradiance records and of samples without interpolation.
     pub(super) gather_rays_per_ray: f64,
     /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of the direct light of a sample with the greater numbers of shadow and gather rays.
+    /// Deviations of direct light in the renders with the greater numbers of shadow and gather rays.
     pub(super) deviations: Deviations,
 }
 
@@ -95,15 +96,15 @@ pub(super) struct Variances {
 pub(super) struct ForCamera {
     /// [`Variances::photon`] of a map for the camera.
     pub(super) photon: f64,
-    /// Ratio of the squared errors, including blur, of a map for the camera and of a map of as many photons
-    /// for any camera. If few photons are used, two maps for any camera are blurred alike, and their
-    /// difference is less than their error.
+    /// Squared error, including blur, of a map for the camera, divided by that of a map of as many photons
+    /// for any camera. The latter is measured against the map for the camera. If few photons are used, two
+    /// maps for any camera are blurred alike, so that their difference is less than their error.
     pub(super) ratio: f64,
 }
 
 impl ForCamera {
-    /// Computes the errors from maps with fewer and with more photons for the camera, and the map with more
-    /// photons for any camera.
+    /// Computes the errors from two maps for the camera, with fewer and with more photons, and from
+    /// `of_scene`, the map with more photons for any camera.
     fn new(effort: Effort, best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
         let photon = of_photon(effort, best, [&few, &more]);
         let own = photon / (MORE * effort.few_photons) as f64;
@@ -111,15 +112,15 @@ impl ForCamera {
         Self { photon, ratio: own / of_scene }
     }
 
-    /// Estimates the errors from that of a map for any camera and the fraction of its photons that the
-    /// picture uses.
+    /// Estimates the errors from `of_scene`, the [`Variances::photon`] of a map for any camera, and the
+    /// fraction of its photons that the picture uses.
     fn estimated(of_scene: f64, used_share: f64) -> Self {
         let photon = ERROR_BY_USED_SHARE * used_share * of_scene;
         Self { photon, ratio: photon / of_scene }
     }
 }
 
-/// Renders the pilots of a picture. Returns the variances that they show.
+/// Renders the pilots of a picture. Returns the variances and errors that they show.
 ///
 /// # Errors
 /// If photons cannot be traced, the settings have no valid camera, or the observer stops the render.
@@ -165,8 +166,8 @@ pub(super) fn measure(
         };
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
-    // Light has the noise of both kinds of rays: the number of each is varied with the greater number of the
-    // other.
+    // Light has the noise of shadow rays and of gather rays. To separate them, only one of the two numbers is
+    // reduced at a time.
     let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
     let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
     let best = pair(shadow_rays, gather_rays)?;
@@ -202,16 +203,16 @@ pub(super) fn measure(
     })
 }
 
-/// Variance of a sample caused by one ray, from a pair of renders with fewer `rays` and the best pair. The
-/// variance with `n` rays is `a + v / n`, where `a` is caused by positions of samples and other rays; two
-/// numbers of rays determine `v`.
+/// Variance `v` of a sample caused by one ray. The pairs of renders `noisy` and `best` have the smaller and
+/// the greater number in `rays`. The variance with `n` rays is `a + v / n`, where positions of samples and
+/// other rays cause `a`; two numbers of rays determine `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
     let [more, less] = of_pairs([noisy, best]);
     ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
 }
 
-/// Variances of a sample in pairs of renders, over pixels that see a surface in all of them, relative to the
-/// radiance in the last pair.
+/// Relative variance of a sample in each pair of renders, over the pixels that see a surface in all renders.
+/// Variances are relative to the squared radiance in the last pair.
 fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
     let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
@@ -234,7 +235,7 @@ fn level_of(best: &[Pixels; 2]) -> f64 {
         .median()
 }
 
-/// Deviations of the pixels of a pair.
+/// Deviations of direct light in the pixels of a pair of renders.
 fn deviations(pair: &[Pixels; 2]) -> Deviations {
     let renders = pair.each_ref();
     Deviations::new((0..pair[0].direct.len()).map(|pixel| {
@@ -243,13 +244,13 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Mean squared error of tiles, extrapolated to a map of one photon, from the difference of two maps with
-/// fewer and more photons whose errors are independent.
+/// Relative mean squared error of tiles, extrapolated to a map of one photon. It follows from the difference
+/// between two maps with fewer and with more photons, whose errors are independent.
 fn of_photon(effort: Effort, best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     difference(best, maps) * effort.few_photons as f64 / (1.0 + 1.0 / MORE as f64)
 }
 
-/// Mean squared difference of tiles between two maps.
+/// Relative mean squared difference between two maps in the mean indirect light of tiles.
 fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
@@ -305,8 +306,8 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
-    /// Number of gather rays that are cast per pixel of the tiles if the setting `gather_rays` is 1 and there
-    /// is one sample a pixel: rays of irradiance records, and of samples that are not interpolated.
+    /// Number of gather rays cast per pixel of the tiles, if the setting `gather_rays` is 1 and there is one
+    /// sample a pixel. It includes the rays of irradiance records and of samples without interpolation.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =
@@ -345,9 +346,9 @@ impl<'a> Pilot<'a> {
 struct Pixels {
     direct: Vec<f64>,
     indirect: Vec<f64>,
-    /// True for pixels whose sample gathers, because it sees a surface with more than mirror reflection.
+    /// True for pixels whose sample casts gather rays: it sees a surface that reflects not only as a mirror.
     is_seen: Vec<bool>,
-    /// Fraction of the samples that see a surface with a Lambertian part.
+    /// Fraction of the samples with gather rays that see a surface with a Lambertian part.
     lambertian: f64,
 }
 
@@ -369,7 +370,7 @@ impl Pixels {
     }
 }
 
-/// Settings of a picture with the same aspect ratio and sides of at least [`MIN_SIDE`] pixels.
+/// Multiplies width and height of the picture by the smallest integer that makes both at least [`MIN_SIDE`].
 fn enlarged(settings: &RenderSettings) -> RenderSettings {
     let [width, height] = [settings.picture.width, settings.picture.height];
     let factor = MIN_SIDE.div_ceil(width.min(height).max(1));
@@ -393,8 +394,8 @@ impl Grid {
         (self.cells * self.cells) as usize
     }
 
-    /// Tiles of equal size in a window, each at a hashed position in its cell. In a small window there are
-    /// fewer tiles, or one of the window's size.
+    /// Tiles of equal size in a window, each at a pseudo-random position in its cell. In a small window there
+    /// are fewer tiles, or one of the window's size.
     fn tiles(&self, window: Window) -> Vec<Tile> {
         let side = self.side;
         let [width, height] = [window.width(), window.height()];

@@ -1,17 +1,17 @@
-//! Relative mean squared differences between renders, over most pixels.
+//! Relative mean squared differences between renders, without the pixels that differ most.
 
-/// Fraction of the squared differences, the greatest ones, that is omitted, because a few bright pixels would
-/// outweigh all others.
+/// Fraction of the pixels that is omitted: those with the greatest squared differences. A few bright pixels
+/// would otherwise outweigh all others.
 const LEFT_OUT: f64 = 0.02;
-/// Levels to which differences are relative: the radiance of each pixel, or the median of the lit pixels if
-/// that is greater, because noise in the dark is less visible.
+/// Radiance of each pixel to which differences are relative. It is at least the median radiance of the lit
+/// pixels, because noise in the dark is less visible.
 pub(super) struct Levels {
     levels: Vec<f64>,
     median: f64,
 }
 
 impl Levels {
-    /// Levels of pixels with these radiances; all 1 for a black picture.
+    /// Creates the levels of pixels with these radiances; all are 1 for a black picture.
     pub(super) fn new(radiances: impl IntoIterator<Item = f64>) -> Self {
         let radiances: Vec<f64> = radiances.into_iter().collect();
         let mut lit: Vec<f64> = radiances.iter().copied().filter(|radiance| *radiance > 0.0).collect();
@@ -25,7 +25,7 @@ impl Levels {
         self.median
     }
 
-    /// Mean over most pixels of `((a - b) / level)^2`.
+    /// Mean of `((a - b) / level)^2`, without the fraction `LEFT_OUT` of the pixels where it is greatest.
     pub(super) fn mean_square(
         &self,
         a: impl IntoIterator<Item = f64>,

@@ -14,7 +14,7 @@ use crate::greeting::GreetingError;
 /// Result of the test of a chip's arithmetic.
 #[derive(Clone, Debug)]
 pub struct ArithmeticTest {
-    /// Number of operand triples.
+    /// Number of operand triples (a, b, c).
     pub cases: usize,
     /// Number of results that were compared.
     pub results: usize,
@@ -45,7 +45,7 @@ pub struct WrongResult {
 }
 
 impl WrongResult {
-    /// Likely cause of the difference, if it is typical of compilers or processors.
+    /// Likely cause of the difference; `None` if it is not typical of compilers or processors.
     pub fn cause(&self) -> Option<&'static str> {
         let [a, b, c] = self.operands;
         let [expected, found] = [self.expected, self.found].map(f32::from_bits);
@@ -63,7 +63,6 @@ impl WrongResult {
     }
 }
 
-/// Runs the test of a chip's arithmetic.
 pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<ArithmeticTest, GreetingError> {
     let cases = cases();
     let mut wrong: [Option<WrongResults>; RESULTS] = [None; RESULTS];
@@ -106,8 +105,8 @@ fn operand_bytes(operands: &[f32; 3]) -> [u8; 12] {
 /// Number of cases with random operands.
 const RANDOM_CASES: u32 = 240;
 
-/// Operands of the test: some that reveal fused multiply-adds, flushed denormal numbers or another rounding
-/// mode, and random ones.
+/// Operands of the test: some chosen to reveal fused multiply-adds, flushed denormal numbers or another
+/// rounding mode, and random ones.
 fn cases() -> Vec<[f32; 3]> {
     let ulp = f32::EPSILON;
     let denormal = f32::MIN_POSITIVE / 2.0;

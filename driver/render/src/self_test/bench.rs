@@ -20,7 +20,7 @@ pub(super) struct Bench<'a, P> {
 }
 
 impl<'a, P: Port> Bench<'a, P> {
-    /// Bench of a card that answered the greeting in `session`.
+    /// Creates the bench of a card that answered the greeting in `session`.
     pub(super) fn new(session: Session, port: &'a mut P, start: Instant, observer: &'a dyn Observer) -> Self {
         let resets = session.link_bytes().resets;
         Self { session, port, start, resets, observer }

@@ -1,4 +1,4 @@
-//! Test of card memory: its patterns with their times and wrong words.
+//! Test of card memory with several patterns: their times and wrong words.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ pub struct PatternTest {
     pub wrong: WrongWords,
 }
 
-/// Runs the test of card memory. Returns the number of lines of the memory, and the results of its patterns.
+/// Runs the test of card memory. Returns the number of lines of the memory, and the result for each pattern.
 pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<(u32, Vec<PatternTest>), GreetingError> {
     let mut patterns = Vec::new();
     bench.session.test_memory(bench.now());
@@ -48,7 +48,7 @@ pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<(u32, Vec<PatternTes
     }
 }
 
-/// Number of bytes written or read so far, and in the whole test.
+/// Number of bytes written or read so far, and total number in the whole test.
 fn bytes(progress: &MemoryTest) -> (u64, u64) {
     let MemoryTest { lines, pattern, written, checked, .. } = *progress;
     let [lines, written, checked] = [lines, written, checked].map(u64::from);

@@ -40,7 +40,8 @@ impl SelfTest {
         self.memory_bytes() < self.budget.dram_bytes
     }
 
-    /// Returns whether all results and all words are right, and the memory is as large as the budget states.
+    /// Returns whether all results and memory words are right, and the memory is as large as the budget
+    /// states.
     pub fn is_passed(&self) -> bool {
         self.arithmetic.wrong.is_empty()
             && self.patterns.iter().all(|pattern| pattern.wrong.count == 0)
@@ -48,8 +49,8 @@ impl SelfTest {
     }
 }
 
-/// Tests the first card at an address. The card forgets its scene. The observer is notified of the number of
-/// memory bytes written or read.
+/// Tests the first card at an address. The card loses the scene in its memory. The observer is notified of
+/// the number of memory bytes written or read.
 ///
 /// # Errors
 /// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the

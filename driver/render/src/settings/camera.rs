@@ -42,8 +42,8 @@ impl RenderSettings {
     }
 }
 
-/// Right, up and forward vectors of a camera whose up vector is in the plane of its direction and +y. For
-/// directions +y and -y, where there is no such plane, right is +x, as if the camera were tilted from glTF's
+/// Right, up and forward vectors of an upright camera: up is in the plane of the direction `forward` and +y.
+/// For the directions +y and -y, which define no plane, right is +x, as if the camera were tilted from glTF's
 /// default direction -z.
 fn upright(forward: DVec3) -> [DVec3; 3] {
     let right = forward.cross(DVec3::Y);

@@ -13,7 +13,6 @@ use crate::error::RenderError;
 /// Minimum number of photons that a gather in the caustic map searches for.
 const MIN_CAUSTIC_NEIGHBORS: u32 = 8;
 
-/// Maximum number of photons.
 const MAX_PHOTONS: usize = 1 << 27;
 
 impl RenderSettings {
@@ -111,7 +110,7 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that a chip has room for a tile with layers, if the picture has layers that chips render.
+    /// Checks that the tile fits into the chip with the sums of all layers that chips render.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
         let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
         let side = self.schedule.tile.unwrap_or(1);

@@ -1,5 +1,5 @@
-//! Settings by option names: those that pixels depend on, those that only the work depends on, and those of
-//! the cards.
+//! Settings as values by option names: those that pixels depend on, those that only the work depends on, and
+//! those of the cards.
 
 use photoncard_scene::Scene;
 use photoncard_shared::image::LAYOUT_VERSION;
@@ -8,11 +8,11 @@ use serde_json::{Map, Value, json};
 use super::RenderSettings;
 use super::setting::{Changes, Setting};
 
-/// Values by option names.
+/// Values of settings by names of command-line options.
 pub type NamedSettings = Map<String, Value>;
 
 impl RenderSettings {
-    /// All settings that an option states, in the order of the groups.
+    /// All settings that command-line options can state, in the order of the groups.
     pub fn options(&self) -> Vec<Setting> {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
         [
@@ -31,8 +31,8 @@ impl RenderSettings {
         self.that_change(Changes::Pixels)
     }
 
-    /// Settings that a chip's work and memory traffic depend on, but no pixel. The kind of chip, its caches
-    /// and [`Schedule::keep_records`](super::Schedule::keep_records) are left out.
+    /// Settings that the work and memory traffic of a chip depend on, but no pixel. They exclude the kind of
+    /// chip, its caches and [`Schedule::keep_records`](super::Schedule::keep_records).
     pub fn of_work(&self) -> NamedSettings {
         self.that_change(Changes::Work)
     }

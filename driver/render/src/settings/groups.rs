@@ -1,4 +1,4 @@
-//! Groups of settings, each with the options that state its fields. A new field does not compile before
+//! Groups of settings, each with the options that state its fields. The compiler rejects a new field until
 //! `options` of its group lists it or leaves it out. Defaults are the dissertation's nominal values (Table
 //! 7.1) on one emulated reference chip.
 
@@ -34,8 +34,8 @@ pub struct Picture {
     pub camera: Option<String>,
     /// Position of the camera in the coordinates of the scene's file, metres; `None` for the camera's own.
     pub camera_at: Option<[f64; 3]>,
-    /// Position that appears in the middle of the picture, in the coordinates of the scene's file, metres,
-    /// with +y upwards; `None` for the camera's own direction.
+    /// Point at which the camera looks, in the coordinates of the scene's file, metres; +y is up in the
+    /// picture. `None` for the camera's own direction.
     pub look_at: Option<[f64; 3]>,
     /// Vertical field of view, degrees; `None` for the camera's own.
     pub fov: Option<f32>,
@@ -51,8 +51,8 @@ impl Picture {
         self.crop.unwrap_or(Window::full(self.width, self.height))
     }
 
-    /// Returns whether both position and direction of the camera are stated, so that the file's view has no
-    /// influence.
+    /// Returns whether both position and direction of the camera are stated, so that the view of the scene
+    /// file has no influence.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
     }
@@ -178,9 +178,9 @@ pub struct Integrator {
     pub sampling: Sampling,
     /// Relative error bound of interpolated irradiance, at most 1; `None` for no interpolation.
     pub irradiance_error: Option<f32>,
-    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. Samples after a
-    /// pixel's probes are means of several paths if the standard deviation of the probes, divided by the
-    /// square root of their mean, exceeds the threshold.
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. It is compared
+    /// with the standard deviation of a pixel's probes, divided by the square root of their mean. If this
+    /// quotient is greater, the samples after the probes are means of several paths.
     pub adaptive_threshold: Option<f32>,
 }
 
@@ -243,11 +243,11 @@ pub struct Schedule {
     /// Side of a tile, pixels; `None` to choose it by cards and picture
     /// ([`tile_side`](super::RenderSettings::tile_side)).
     pub tile: Option<u32>,
-    /// Order of the photon gathers.
+    /// Order in which a chip does the photon gathers.
     pub order: GatherOrder,
     /// Number of direction bins of the gather rays, for orders with bins; `None` for the default.
     pub bins: Option<u32>,
-    /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's
+    /// Maximum number of gathers in the queue of a chip, for orders with a queue; `None` for the chip's
     /// capacity.
     pub queue: Option<u32>,
     /// Maximum number of tiles in flight on a chip; `None` for the chip's capacity.
@@ -259,8 +259,8 @@ pub struct Schedule {
     pub part: Option<Part>,
     /// True if the picture is one of several whose samples are added
     /// ([`Renderer::refine`](crate::Renderer::refine)). Cards then keep irradiance records between pictures,
-    /// in their memory beyond the card image. The setting has no effect with `verify`, which compares the
-    /// work of cards.
+    /// in their memory beyond the card image. The setting has no effect if tiles are verified, because the
+    /// work of cards is then compared.
     pub keep_records: bool,
 }
 
@@ -277,7 +277,7 @@ impl Schedule {
     }
 }
 
-/// Cards that render, and tests and models of them. No pixel depends on these settings.
+/// Cards that render, with faults, verification and a memory model. No pixel depends on these settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardSet {
     /// Addresses of the cards.
@@ -286,11 +286,11 @@ pub struct CardSet {
     pub faults: Option<LineFaults>,
     /// Fraction of the tiles that two cards render for comparison; `None` for no tiles.
     pub verify: Option<f64>,
-    /// Caches of the memory model; `None` for no model, unless `trace` is stated. Without a model, memory is
-    /// read at no extra cost.
+    /// Caches of the memory model. `None` for no model, unless `trace` is stated. Without a model, reads have
+    /// no extra cost.
     pub caches: Option<CacheSettings>,
-    /// Trace of every read of the chip, which must be the only one. Without `caches`, the caches of the kind
-    /// of chip are modelled.
+    /// Trace of every read of the chip, for which the set must have a single, emulated card. Without
+    /// `caches`, the caches of its kind of chip are modelled.
     pub trace: Option<TraceSettings>,
 }
 

@@ -39,15 +39,15 @@ pub struct RenderSettings {
     pub outputs: TileOutputs,
 }
 
-/// Default number of direction bins: three per entry of the direction table.
+/// Default number of direction bins for gather rays: three per entry of the direction table.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Default minimum number of tiles per card, if there are several cards. A card waits half a tile's time, on
-/// average, for the last tile of another card.
+/// Default minimum number of tiles per card, if there are several cards. At the end, a card waits on average
+/// half the time of a tile for the last tile of another card.
 const TILES_OF_CARD: u64 = 4;
 
-/// Minimum side of tiles by default, pixels: the side of the coarsest cells of irradiance records. Narrower
-/// tiles would compute these records several times.
+/// Minimum side to which tiles are halved by default, pixels: the side of the coarsest cells of irradiance
+/// records. Narrower tiles would compute these records several times.
 const NARROWEST_TILE: u32 = 16;
 
 /// Default number of caustic photons for a scene with a specular surface.
@@ -66,9 +66,9 @@ impl RenderSettings {
         self.picture.window()
     }
 
-    /// Side of the tiles on cards with `budgets`, pixels. It is [`Schedule::tile`] if stated; otherwise the
-    /// widest for which each card has room, because wide tiles read the least memory. For several cards the
-    /// side is halved, down to 16 pixels, while the window has fewer than four tiles per card.
+    /// Side of the tiles on cards with `budgets`, pixels. It is [`Schedule::tile`] if stated. Otherwise it is
+    /// the greatest for which each card has room, because wide tiles read the least memory. For several cards
+    /// the side is halved, down to 16 pixels, while the window has fewer than four tiles per card.
     pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
         if let Some(side) = self.schedule.tile {
             return side;
@@ -118,9 +118,9 @@ impl RenderSettings {
         if scene.is_specular() { asked } else { 0 }
     }
 
-    /// Canonical settings, equal for all settings that give this scene equal pixels. The number of caustic
-    /// photons is that for the scene; photons are for any camera if no pilot has decided; and without a
-    /// caustic map, the number of its neighbours is the default.
+    /// Canonical form of the settings: it is equal for all settings that give this scene equal pixels. The
+    /// number of caustic photons is that for the scene. Photons are for any camera if no pilot has decided.
+    /// Without a caustic map, the number of its neighbours is the default.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         let caustic_photons = self.caustic_photons(scene);
@@ -133,8 +133,8 @@ impl RenderSettings {
         })
     }
 
-    /// Parameters of the photon maps of a scene. If the scene lacks the camera of the settings, the
-    /// parameters name no camera.
+    /// Parameters of the photon maps of a scene. They contain no camera if photons are for any camera, or if
+    /// the scene lacks the camera of the settings.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
             PhotonsFor::Scene | PhotonsFor::Auto => None,
@@ -153,7 +153,7 @@ impl RenderSettings {
         }
     }
 
-    /// Returns whether cards keep irradiance records for pictures with other samples.
+    /// Returns whether cards keep irradiance records for later pictures that add samples.
     fn keeps_records(&self) -> bool {
         self.schedule.keep_records
             && self.integrator.irradiance_error.is_some()

@@ -27,17 +27,17 @@ pub struct Setting {
     pub field: &'static str,
     /// Name of the option, such as `spp`. Provenance has the value by this name.
     pub option: &'static str,
-    /// Value for provenance; `None` if no result depends on it, or if another row has it.
+    /// Value that provenance records; `None` if no result depends on it, or if another row has it.
     pub value: Option<Value>,
-    /// Argument with which the option states the value; `None` to leave the option out.
+    /// Argument of the option that states the value; `None` to leave the option out.
     pub argument: Option<String>,
 }
 
-/// Value of a setting for provenance, and as an argument.
+/// Value of a setting for provenance, and the argument of its option.
 type Stated = (Option<Value>, Option<String>);
 
-/// Neither value nor argument: errors name the field, but nothing depends on it, or another row has its
-/// value.
+/// No value and no argument, for a row that only names the option of a field in errors. Nothing depends on
+/// the field, or another row has its value.
 pub(super) const UNSTATED: Stated = (None, None);
 
 pub(super) fn setting(
@@ -53,7 +53,7 @@ pub(super) fn value(value: &(impl ToString + Serialize)) -> Stated {
     (Some(json!(value)), Some(value.to_string()))
 }
 
-/// Value of an option that is left out for `None`.
+/// Value and argument of an option that is left out for `None`.
 pub(super) fn optional(value: Option<impl ToString + Serialize>) -> Stated {
     (Some(json!(value)), value.map(|value| value.to_string()))
 }

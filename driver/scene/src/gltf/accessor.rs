@@ -1,6 +1,6 @@
 //! Elements of accessors, read in place after every bound is checked.
 //!
-//! Nothing is allocated in proportion to an accessor's count, because no bytes need to back the count:
+//! Nothing is allocated in proportion to an accessor's count. A short file may state any count, because
 //! elements without a buffer view are zeros.
 
 use std::borrow::Cow;
@@ -21,8 +21,8 @@ const REMEDY: &str = "export the scene again; the accessor, its buffer view and 
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
     buffers: &'a Buffers<'a>,
-    /// Indices of accessors whose sparse indices were checked to increase: an accessor that many primitives
-    /// share is checked once.
+    /// Indices of accessors whose sparse indices were found to increase. An accessor that many primitives
+    /// share is thus checked once.
     increasing: RefCell<BTreeSet<usize>>,
     pub(super) decompressed: Decompressed,
 }
@@ -35,7 +35,7 @@ pub(super) struct Decompressed {
     pub(super) bytes: Cell<u64>,
 }
 
-/// Element and component types that an accessor may have in one use of it, such as for texture coordinates.
+/// Element and component types that an accessor may have for one purpose, such as texture coordinates.
 pub(super) struct Format {
     pub(super) types: &'static [Type],
     pub(super) components: &'static [ComponentType],
@@ -131,8 +131,8 @@ fn unsigned(bytes: &[u8]) -> u64 {
 }
 
 impl Header {
-    /// Reads the header of accessor `index`, whose types `format` must allow. `item` is the JSON path that
-    /// refers to the accessor.
+    /// Reads the header of accessor `index`; an error if `format` does not allow its types. `item` is the
+    /// JSON path that refers to the accessor.
     fn of(
         document: &Document,
         index: usize,
@@ -170,8 +170,8 @@ impl Header {
 }
 
 impl<'a> Elements<'a> {
-    /// Reads the elements of accessor `index`, whose types `format` must allow. `item` is the JSON path that
-    /// refers to the accessor.
+    /// Reads the elements of accessor `index`; an error if `format` does not allow its types. `item` is the
+    /// JSON path that refers to the accessor.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
@@ -181,8 +181,8 @@ impl<'a> Elements<'a> {
         Self::decompressed(source, index, item, format, |_| Ok(None))
     }
 
-    /// Does what [`new`](Self::new) does, with bytes that `decompress` may supply in place of the accessor's
-    /// buffer view.
+    /// Does what [`new`](Self::new) does. `decompress` may return bytes that replace the accessor's buffer
+    /// view.
     pub(super) fn decompressed(
         source: &Source<'a>,
         index: usize,
@@ -213,7 +213,7 @@ impl<'a> Elements<'a> {
         Ok(Self { count, component, components: kind.multiplicity(), is_normalized, base, sparse })
     }
 
-    /// Elements of the indices of a decompressed primitive, which need no accessor.
+    /// Creates elements from the indices of a decompressed primitive, without an accessor.
     pub(super) fn indices(indices: impl Iterator<Item = u32>) -> Self {
         let bytes: Vec<u8> = indices.flat_map(u32::to_le_bytes).collect();
         let size = size_of::<u32>();

@@ -45,7 +45,8 @@ pub struct Animation {
     pub moves_only_cameras: bool,
 }
 
-/// Translation, rotation, scale and weights that animations give a node; each replaces that of the node.
+/// Translation, rotation, scale and weights of a node that animations replace; `None` leaves the node's own
+/// value.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NodePose {
     pub(super) translation: Option<DVec3>,
@@ -78,7 +79,7 @@ pub(super) fn playing(document: &Document, names: &[String]) -> Result<Vec<usize
 /// Evaluates the poses of all animated nodes at a moment.
 ///
 /// # Errors
-/// If an animation is invalid, or two that play move the same property of a node.
+/// If an animation is invalid, or two of the moment's animations move the same property of a node.
 pub(super) fn poses(source: &Source<'_>, moment: &Moment) -> Result<Poses, SceneError> {
     let mut poses = Poses::new();
     for index in playing(source.document, &moment.animations)? {
@@ -191,16 +192,16 @@ impl<'a> Channel<'a> {
         self.source.document.invalid(&self.item, reason, remedy)
     }
 
-    /// Element `element` of a keyframe's output: the weight of that morph target, or the only element of
-    /// another property. `kind` selects in-tangent (0), value (1) or out-tangent (2) of a cubic spline; else
-    /// `kind` is 0.
+    /// Reads element `element` of a keyframe's output. For weights it is the weight of that morph target;
+    /// other properties have one element. `kind` selects the in-tangent (0), value (1) or out-tangent (2) of
+    /// a cubic spline; it is 0 for other interpolations.
     fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
         let of_each = self.keyframes.values_of_each();
         let index = (keyframe * of_each + kind) * self.elements + element;
         DVec4::from_array(self.values.floats(index, [0.0; 4]).map(f64::from))
     }
 
-    /// Value of an element at `place`, a position among the keyframes, interpolated component by component.
+    /// Interpolates an element component by component at `place`, a time between keyframes.
     fn value(&self, place: Place, element: u64) -> DVec4 {
         let Place { keyframe, share, interval } = place;
         match self.keyframes.interpolation {
@@ -222,8 +223,8 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Evaluates a rotation; `LINEAR` is spherical, along the shorter arc. The quaternion has length 1, or 0
-    /// if the file's quaternions are zero.
+    /// Evaluates a rotation. `LINEAR` interpolation is spherical, along the shorter arc. The quaternion has
+    /// length 1, or 0 if the file's quaternions are zero.
     fn rotation(&self, place: Place) -> DQuat {
         let unit = |value: DVec4| DQuat::from_vec4(value.normalize_or_zero());
         let Place { keyframe, share, .. } = place;

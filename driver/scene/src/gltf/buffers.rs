@@ -31,7 +31,7 @@ impl<'a> Buffers<'a> {
         Self { document, bytes, decoded: DecodedViews::new(root.buffer_views.len()) }
     }
 
-    /// Bytes of the buffer view `index`; `None` if they exceed its buffer.
+    /// Bytes of buffer view `index`, decoded if it is compressed; `None` if they exceed its buffer.
     pub(super) fn view(&self, index: usize, view: &json::buffer::View) -> Result<Option<&[u8]>, SceneError> {
         if let Some(compressed) = Compressed::of(self.document, index, view)? {
             let stream = self.part(compressed.buffer(), compressed.place())?;

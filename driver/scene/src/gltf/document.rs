@@ -145,8 +145,8 @@ impl Document {
         Err(self.invalid("asset.version", reason, "export the scene as glTF 2.0"))
     }
 
-    /// Checks `POSITION` of all primitives, because the `gltf` crate's validation uses it as an index
-    /// unchecked.
+    /// Checks that the `POSITION` accessor of every primitive exists. The `gltf` crate's validation indexes
+    /// with it unchecked.
     fn check_positions(&self) -> Result<(), SceneError> {
         let accessors = self.root.accessors.len();
         for (m, mesh) in self.root.meshes.iter().enumerate() {
@@ -328,8 +328,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     }
 }
 
-/// Parses a text that is valid JSON but that the types of the `gltf` crate reject, after [`schema::amend`]
-/// has changed it.
+/// Parses valid JSON that the types of the `gltf` crate reject. [`schema::amend`] changes the JSON before.
 fn parse_amended(
     path: &Path,
     text: &str,

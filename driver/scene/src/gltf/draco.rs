@@ -1,8 +1,8 @@
 //! Compressed primitives (`KHR_draco_mesh_compression`), decoded by the crate `draco-core`.
 //!
 //! The length of a stream does not bound its contents: equal values may take no bytes. The decoder therefore
-//! compares the stream's counts with those of the primitive's accessors before it allocates, and they are
-//! compared again after decoding.
+//! refuses counts above those of the primitive's accessors before it allocates. The counts are compared again
+//! after decoding.
 
 use std::collections::BTreeMap;
 
@@ -22,8 +22,8 @@ use super::limits::MAX_TRIANGLES;
 use super::topology::Topology;
 use crate::error::SceneError;
 
-/// Assumed memory of the decoder per triangle, bytes. Without seams of attributes it takes 110, with seams
-/// more.
+/// Assumed memory of the decoder per triangle, bytes. Without attribute seams the decoder takes 110 bytes,
+/// with seams more.
 const TRIANGLE_BYTES: u64 = 256;
 
 /// Size of a triangle's indices, bytes.
@@ -35,7 +35,6 @@ const UNNAMED_BYTES: u64 = 64;
 const REMEDY: &str =
     "compress the file again, or decompress it, for example by `npx @gltf-transform/cli copy IN.glb OUT.glb`";
 
-/// JSON of the extension in a primitive.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Extension {
@@ -47,7 +46,7 @@ struct Extension {
 /// Counts that a stream must have, according to the accessors of its primitive.
 struct Counts {
     vertices: u64,
-    /// Number of triangles; the maximum number for a strip.
+    /// Number of triangles. A strip may have fewer, because the stream lacks those of zero area.
     triangles: u64,
     /// Size of the attributes of one vertex, bytes.
     vertex_bytes: u64,

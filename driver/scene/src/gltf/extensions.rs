@@ -1,6 +1,5 @@
 //! glTF extensions that the loader supports.
 
-/// Names of the supported extensions.
 pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
     INSTANCING,
     WEBP,

@@ -1,4 +1,4 @@
-//! Offset of the scene's origin from the file's, computed from the bounds of the scene at rest.
+//! Offset of the scene's origin from the file's, computed from the bounds of the scene without animations.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
-    /// Computes the offset of a scene from the world transforms of its nodes at rest.
+    /// Computes the offset of a scene from the world transforms that its nodes have without animations.
     pub(super) fn of(
         source: &Source<'_>,
         meshes: &mut MeshPlacer<'_>,
@@ -47,7 +47,7 @@ impl Anchor {
     }
 
     /// Converts a node's local transform from the file's origin to the scene's. `is_posed` is true if an
-    /// animation states the node's translation.
+    /// animation sets the node's translation, `is_root` if the node has no parent.
     pub(super) fn placed(&self, node: usize, mut local: DMat4, is_posed: bool, is_root: bool) -> DMat4 {
         if self.offset != DVec3::ZERO {
             let stated = self.stated.get(node).copied().flatten().filter(|_| !is_posed);
@@ -58,7 +58,7 @@ impl Anchor {
     }
 }
 
-/// Computes the bounds of the triangles of a scene at rest.
+/// Computes the bounds of the triangles of a scene without animations.
 struct Extent<'e, 's, 'a> {
     source: &'e Source<'s>,
     meshes: &'e mut MeshPlacer<'a>,
@@ -66,7 +66,7 @@ struct Extent<'e, 's, 'a> {
     locals: BTreeMap<usize, Local>,
 }
 
-/// Bounds, in the mesh's space, of the mesh's primitives that have triangles, and the number of these
+/// Bounds of the primitives of a mesh that have triangles, in the mesh's space, and the number of their
 /// triangles.
 #[derive(Clone, Default)]
 struct Local {

@@ -19,10 +19,9 @@ use crate::{Encoding, Image};
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// Maximum number of texels of all images, in the sizes of their files. It bounds the time that decoding
-/// takes.
+/// Maximum number of texels of all images before they are scaled down. It bounds the time of decoding.
 const MAX_TEXELS: u64 = 1 << 31;
-/// Maximum number of texels of several images that are decoded at once, before they are scaled down.
+/// Maximum number of texels of several images that are decoded in parallel, before they are scaled down.
 const TEXELS_AT_ONCE: u64 = 1 << 28;
 
 /// Image that a texture requests, with its encoding.
@@ -61,7 +60,7 @@ struct Decoded {
 
 /// Failure to read an image.
 enum Failure {
-    /// Fault of the image alone, without which the scene can be loaded.
+    /// Fault of the image alone. The scene can be loaded without the image.
     Image(Fault),
     /// Fault of a buffer, which other parts of the scene need as well.
     Scene(SceneError),
@@ -87,7 +86,7 @@ fn take_together<'a, 'w>(
     std::iter::from_fn(|| found.next_if(|(image, _)| fits(image))).collect()
 }
 
-/// Decodes images, whose indices must exist. Those that cannot be read are `None` in the result, and are
+/// Decodes images, whose indices must exist. Images that cannot be read are `None` in the result, and are
 /// described in `unreadable`.
 ///
 /// # Errors

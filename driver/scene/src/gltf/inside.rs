@@ -14,10 +14,10 @@ const MAX_OPEN: usize = 3;
 /// Maximum number of triangles of a scene that is tested, because each ray is tested against every triangle.
 const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Number of lamps that are tested, the brightest first.
+/// Number of light sources that are tested, the brightest first.
 const LAMPS: usize = 4;
 
-/// Position of the camera between the tested point, 0, and the wall behind it, 1.
+/// Position of the camera on the way from the tested point (0) to the wall behind it (1).
 const BEFORE_WALL: f32 = 0.92;
 
 /// Offset of the test rays' origin from the lamp's surface, as a fraction of the scene's diagonal.
@@ -53,10 +53,10 @@ pub(super) fn view(scene: &Scene) -> Option<(Vec3, Vec3)> {
     Some((place + back * (BEFORE_WALL * length), -back))
 }
 
-/// Position of a lamp, and the normal of its emitting side; `None` for a lamp without a surface.
+/// Light source: its position, and the normal of its emitting side; `None` for a light without a surface.
 type Lamp = (Vec3, Option<Vec3>);
 
-/// Positions of the brightest lamps.
+/// The brightest point lights, spot lights and emissive triangles.
 fn lamps(scene: &Scene) -> Vec<Lamp> {
     let mut lamps = Vec::new();
     for light in &scene.lights {
@@ -82,8 +82,8 @@ fn lamps(scene: &Scene) -> Vec<Lamp> {
     lamps.into_iter().take(LAMPS).map(|(_, lamp)| lamp).collect()
 }
 
-/// Returns whether nearly all rays from a lamp meet surfaces, and less than half of them the back of a
-/// one-sided surface.
+/// Returns whether nearly all rays from a lamp meet surfaces, and less than half of the rays meet the back of
+/// a one-sided surface.
 fn is_enclosed(scene: &Scene, (place, side): Lamp) -> bool {
     let directions = (0..DIRECTIONS).map(direction);
     let directions: Vec<Vec3> =

@@ -35,7 +35,6 @@ struct InstanceAttributes {
     scale: Option<usize>,
 }
 
-/// Instances of a node's mesh.
 pub(super) struct Instances<'a> {
     item: String,
     pub(super) count: u64,

@@ -1,9 +1,9 @@
 //! Scans a JSON text in one pass before it is parsed, without storing values.
 //!
 //! The scan bounds the memory of the parsed text, because two characters may become a material of hundreds of
-//! bytes. Each value counts as the largest value of its kind, in the types of the `gltf` crate and of the
-//! loader, times two because lists grow by doubling. The scan also finds repeated keys of an object. glTF
-//! forbids them, and parsers differ in which value they take.
+//! bytes. Each value counts as twice the largest value of its kind in the types of the `gltf` crate and the
+//! loader, because lists grow by doubling. The scan also finds repeated keys of an object. glTF forbids them,
+//! and parsers differ in which value they take.
 //!
 //! A parser skips values that it does not need, whatever they are: numbers beyond the range of floats, lone
 //! surrogates, any depth. The scan skips them too: it only splits the text into tokens, and never fails. Its
@@ -37,7 +37,6 @@ const OBJECT: u64 = 640;
 /// Maximum number of characters of a key in a message.
 const SHOWN: usize = 80;
 
-/// Result of a scan.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scanned {
     /// Estimated memory of the parsed text, bytes.
@@ -99,8 +98,8 @@ fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     at.min(bytes.len())
 }
 
-/// Estimated memory of an element of a list of the root, bytes: twice that of the `gltf` crate's and the
-/// loader's data.
+/// Estimated memory of an element of the root's member `list`, bytes: twice the size of its types in the
+/// `gltf` crate and the loader.
 fn element(list: &str) -> u64 {
     let placed =
         size_of::<(usize, DMat4)>() + size_of::<Option<DMat4>>() + size_of::<(usize, DMat4, usize)>();
@@ -152,7 +151,6 @@ struct Frame {
     expects_key: bool,
 }
 
-/// State of a scan.
 #[derive(Default)]
 struct Scan<'t> {
     bytes: u64,
@@ -232,7 +230,8 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Removes the keys of an object, which start at index `first`, and records a repeated one.
+    /// Removes the keys of an object, the first of which has the index `first`. Stores the path of a repeated
+    /// key.
     fn end_object(&mut self, first: usize) {
         if self.free.is_none() && self.repeated_key.is_none() {
             let keys = &mut self.keys[first..];
@@ -243,7 +242,7 @@ impl<'t> Scan<'t> {
         self.keys.truncate(first);
     }
 
-    /// JSON path of a key of the object that was closed last, whose first key has the index `first`.
+    /// JSON path of a key of the object that was closed last. `first` is the index of the object's first key.
     fn path_to(&self, key: &str, first: usize) -> String {
         let mut path = String::new();
         // In `keys` the last key of each open object precedes the first key of the next inner object.

@@ -22,10 +22,10 @@ pub(super) struct Keyframes<'a> {
 pub(super) struct Place {
     /// Index of the last keyframe at or before the time; 0 if the time precedes all keyframes.
     pub(super) keyframe: u64,
-    /// Fraction of the interval to the next keyframe that has passed, 0 to 1. It is 0 before the first
-    /// keyframe and after the last.
+    /// Fraction of the time to the next keyframe that has passed, 0 to 1. It is 0 before the first keyframe
+    /// and after the last.
     pub(super) share: f64,
-    /// Time between the two keyframes, seconds; 0 if the time is not between two.
+    /// Time from that keyframe to the next one, seconds; 0 if `share` is 0.
     pub(super) interval: f64,
 }
 

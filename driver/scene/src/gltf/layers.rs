@@ -80,7 +80,6 @@ fn one() -> f32 {
     1.0
 }
 
-/// Reader of a material's layers.
 struct Reader<'a, 'd> {
     document: &'a Document,
     textures: &'a mut Textures<'d>,
@@ -89,9 +88,9 @@ struct Reader<'a, 'd> {
     index: usize,
 }
 
-/// Reads the layers of a material; `None` if it has none. `specular` is the F0 of its base before the limit
-/// of 1, without `specularFactor`. `is_gltf` is false for a Phong reflection, which may have a normal map
-/// only.
+/// Reads the layers of a material; `None` if it has none. `specular` is the F0 of its base before
+/// `specularFactor` and the limit of 1 are applied. `is_gltf` is false for a Phong reflection, which may have
+/// a normal map only.
 pub(super) fn load(
     document: &Document,
     index: usize,
@@ -164,8 +163,8 @@ impl Reader<'_, '_> {
             return Ok(());
         };
         let name = "KHR_materials_specular";
-        // The factor is in alpha, which is linear in sRGB too: the two textures, often of one image, share an
-        // encoding.
+        // The factor is in alpha, which is linear in sRGB images too. The two textures, often of one image,
+        // can therefore share an encoding.
         let [factor, colour] = [&specular.specular_texture, &specular.specular_color_texture];
         layers.specular_texture = self.texture(name, "specularTexture", factor.as_ref(), Use::Colour)?;
         layers.specular_colour_texture =

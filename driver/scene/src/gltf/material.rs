@@ -175,8 +175,8 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
     }
 }
 
-/// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction
-/// times `specularColorFactor`.
+/// F0 of the dielectric without `specularFactor` and the limit of 1: `((ior - 1) / (ior + 1))^2
+/// specularColorFactor`.
 fn unlimited_f0(source: &json::Material) -> Vec3 {
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
@@ -193,7 +193,7 @@ fn emission(material: &json::Material) -> Vec3 {
     Vec3::from(material.emissive_factor.0) * strength.map_or(1.0, |strength| strength.emissive_strength.0)
 }
 
-/// Returns whether the material has an emissive texture whose factor is zero.
+/// Returns whether the material has an emissive texture, but an emissive factor or strength of 0.
 pub(super) fn has_dark_texture(material: &json::Material) -> bool {
     material.emissive_texture.is_some() && emission(material) == Vec3::ZERO
 }

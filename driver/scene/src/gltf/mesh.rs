@@ -22,7 +22,6 @@ use crate::error::SceneError;
 use crate::triangle::bounds_of;
 use crate::{Instance, Scene, Triangle};
 
-/// Conversion of meshes to triangles of the scene.
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,

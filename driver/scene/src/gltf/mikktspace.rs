@@ -1,9 +1,9 @@
 //! Tangents by `MikkTSpace` (Mikkelsen 2008, *Simulation of wrinkled surfaces revisited*), as bakers of
 //! normal maps compute them.
 //!
-//! Time is quadratic, and the stack depth linear, in the number of triangles that share a vertex. Triangles
-//! at a vertex with more than [`FAN`] are therefore treated as if they had no neighbours, which in a flat fan
-//! gives equal tangents.
+//! Time is quadratic, and the stack depth linear, in the number of triangles that share a vertex. If more
+//! than [`FAN`] triangles share a vertex, they are therefore treated as if they had no neighbours. In a flat
+//! fan this gives the same tangents.
 
 use std::collections::HashMap;
 
@@ -16,7 +16,6 @@ const FAN: u32 = 128;
 /// Memory that [`tangents`] takes per triangle, including argument and result, bytes.
 pub(super) const BYTES_OF_A_TRIANGLE: u64 = 1600;
 
-/// Corner of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Corner {
     pub(super) position: Vec3,

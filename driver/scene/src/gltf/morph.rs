@@ -19,7 +19,8 @@ const DISPLACEMENTS: Format = Format {
     integers: Integers::AsStated,
 };
 
-/// Maximum number of morph targets of a primitive: each costs time for all vertices, even one of a few bytes.
+/// Maximum number of morph targets of a primitive. Even a target that takes few bytes of the file costs time
+/// for every vertex.
 const MAX_TARGETS: usize = 1024;
 
 /// Accessors of one morph target's displacements, each with as many elements as the primitive has vertices.

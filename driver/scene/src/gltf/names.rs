@@ -13,7 +13,7 @@ pub(super) fn node_name(root: &json::Root, node: usize) -> String {
     name.map_or_else(|| format!("node {node}"), |name| format!("node '{name}'"))
 }
 
-/// List of names in quotation marks, for an error that offers them.
+/// List of names in quotation marks, for an error that offers them as choices.
 pub(super) fn listed(names: &[String]) -> String {
     if names.is_empty() {
         return "none: leave the option out".to_owned();

@@ -24,9 +24,9 @@ use crate::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes. Animated nodes are in `poses`; the intensities
-/// of lights are read in `units`. `anchor` caches the offset of the scene's origin, which follows from the
-/// scene at rest.
+/// Adds the meshes, lights and cameras of the scene's nodes to `scene`. `poses` has the animated nodes, and
+/// `units` are the units of the lights' intensities. `anchor` caches the offset of the scene's origin, which
+/// is computed from the scene without animations.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
@@ -61,7 +61,8 @@ pub(super) fn place(
     Ok(())
 }
 
-/// Cameras of the scene's nodes in their poses.
+/// Cameras of the scene's nodes in the poses `poses`. Positions are relative to the scene's origin, or to the
+/// file's without an anchor.
 pub(super) fn cameras(
     document: &Document,
     poses: &Poses,
@@ -108,7 +109,7 @@ impl<'a> Placer<'a> {
         self.meshes.count(mesh, instances.count, transforms.map(|local| Ok(*world * local?)))
     }
 
-    /// Offset of the scene's origin, computed on first use from the scene at rest.
+    /// Offset of the scene's origin, computed on first use from the scene without animations.
     fn anchor<'o>(
         &mut self,
         found: &'o OnceLock<Anchor>,
@@ -191,8 +192,8 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// Nodes of the default scene, or of the first one, parents before children, with their world transforms. The
-/// transforms are relative to the scene's origin, or to the file's without an anchor.
+/// Nodes of the file's default scene, or of its first one, with their world transforms; parents come before
+/// children. The transforms are relative to the scene's origin, or to the file's without an anchor.
 fn walk(
     document: &Document,
     poses: &Poses,

@@ -21,14 +21,14 @@ use crate::{Concern, LightUnits, blender};
 /// Maximum number of names in a notice. Further ones are counted.
 const LISTED: usize = 8;
 
-/// Facts that are collected during loading. Other notices follow from the JSON.
+/// Facts for notices that are collected during loading. Other notices follow from the JSON alone.
 #[derive(Default)]
 pub(super) struct Notices {
     /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
-    /// Names of glass materials that were made solid or thin-walled against what they state.
+    /// Names of glass materials that were made solid or thin-walled contrary to what the file states.
     pub(super) glass: Resolved,
-    /// Names of solid glass materials with coinciding faces.
+    /// Names of solid glass materials with coinciding faces that cannot be joined.
     pub(super) touching_glass: Vec<String>,
     /// Units of the lights that follow from Blender's name in `asset.generator`; `None` if the settings state
     /// them.
@@ -37,7 +37,7 @@ pub(super) struct Notices {
     pub(super) blender_spots: Vec<String>,
     /// Names of spot lights whose angles were clamped.
     pub(super) clamped_spots: Vec<String>,
-    /// Names of spot lights that illuminate nothing.
+    /// Names of spot lights that are left out, because their outer cone angle is not above 0.
     pub(super) closed_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
@@ -259,7 +259,7 @@ fn concern_of(extension: &str) -> Option<Concern> {
     }
 }
 
-/// Remark on animations of a file that is loaded at rest.
+/// Remark that a file's animations do not play; `None` if it has none.
 pub(super) fn of_animations(root: &json::Root) -> Option<String> {
     let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
     let sentence = "the scene is rendered as it stands, its animations by --frames";

@@ -1,19 +1,21 @@
 //! Offset of the origin for a scene far from the file's origin, so that single precision suffices.
 //!
-//! Positions in a file of a building or a map may be thousands of kilometres from its origin, where single
-//! precision resolves half a metre. The scene's origin is then a point near the scene whose coordinates have
-//! few digits. If an exporter has added such an offset, the subtraction is exact, and the scene equals one
+//! Positions in a file of a building or a map may be thousands of kilometres from its origin, where steps of
+//! single precision are half a metre. The scene's origin is then a point near the scene whose coordinates
+//! have few digits. If an exporter has added such an offset, the subtraction is exact: the scene equals one
 //! that is modelled at the origin.
 
 use glam::{DMat4, DVec3};
 
 use super::limits::MAX_COORDINATE;
 
-/// Distance of a scene's centre from the origin beyond which the scene is moved, in sizes of the scene.
+/// Distance of a scene's centre from the file's origin beyond which the scene is moved, in units of the
+/// scene's size.
 const NEAR: f64 = 16.0;
 
-/// Distance of a scene's centre from the origin beyond which the scene is moved, unless the scene is larger
-/// than this distance, metres. Beyond it single precision is coarser than 60 um.
+/// Distance of a scene's centre from the file's origin beyond which the scene is moved, metres. For a scene
+/// larger than this distance, the limit is the scene's size. Single precision is coarser than 60 um beyond
+/// 1000 m.
 const FAR: f64 = 1000.0;
 
 /// Least exponent of a power of two to which the offset is rounded: 2^-10 m.
@@ -60,8 +62,8 @@ impl Bounds {
     }
 
     /// Offset of a scene with these bounds, metres. It is 0 along axes on which the scene is near the origin.
-    /// `stated` are translations of nodes that contain the whole scene. Along each axis, a translation that
-    /// is integral and at most the scene's size from the scene's centre is preferred.
+    /// `stated` are translations of top-level nodes. Along each axis, a whole-number translation within one
+    /// scene size of the scene's centre is preferred.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();
@@ -82,8 +84,8 @@ impl Bounds {
     }
 }
 
-/// Returns the number from `low` to `high`, which have one sign, that has the fewest digits: the nearest to
-/// the middle of several. A decimal digit counts as two binary ones.
+/// Returns the number with the fewest digits from `low` to `high`, which have the same sign; of several, the
+/// one nearest to the middle. A decimal digit counts as two binary digits.
 fn roundest(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;
@@ -100,8 +102,8 @@ fn roundest(low: f64, high: f64) -> f64 {
     found.min_by(is_better).map_or(0.0, |(_, number)| number)
 }
 
-/// Returns the multiple of a power of `base` in `range` that is nearest to `middle`, with the exponent: the
-/// first of `powers` that has a multiple in the range.
+/// Returns the multiple of `base^power` that is nearest to `middle`, and `power`: the first of `powers` for
+/// which this multiple is in `range`.
 fn multiple(
     base: f64,
     mut powers: impl Iterator<Item = i32>,
@@ -115,9 +117,9 @@ fn multiple(
     })
 }
 
-/// Translation of a node relative to the scene's origin; `stated` is that of the file in double precision.
-/// Components below half the greatest of the offset are rounded to single precision, as in a scene without an
-/// offset. The offset is subtracted from nodes without a parent.
+/// Translation of a node relative to the scene's origin. `stated` is the file's translation in double
+/// precision; the offset is subtracted if the node is a root. Components below half the offset's greatest
+/// component are rounded to single precision, as in a scene without an offset.
 pub(super) fn translation(stated: DVec3, offset: DVec3, is_root: bool) -> DVec3 {
     let moved = if is_root { stated - offset } else { stated };
     let limit = 0.5 * offset.abs().max_element();

@@ -1,4 +1,4 @@
-//! Images of textures.
+//! Sources of the images of textures.
 
 use gltf::json;
 
@@ -14,8 +14,8 @@ pub(super) enum Origin {
 }
 
 impl Origin {
-    /// Finds the image of a texture: its own `source`, of which the images of extensions are copies, else
-    /// that of an extension.
+    /// Finds the image of a texture: its own `source` or, if that does not exist, the image of an extension.
+    /// An extension's image is a copy of `source` in another format.
     pub(super) fn of(root: &json::Root, texture: usize) -> Self {
         let stated = &root.textures[texture];
         let extensions = stated.extensions.as_ref();

@@ -10,7 +10,7 @@ use crate::error::SceneError;
 const BY_HAND: &str =
     "open it in the program that wrote it, or import it into Blender, and export glTF 2.0 (.glb)";
 
-/// First bytes of files, and suffixes of their names.
+/// First bytes of files, and extensions of their names.
 type Signs = (&'static [&'static [u8]], &'static [&'static str]);
 
 /// Formats other than glTF, with the signs by which they are recognised.
@@ -53,13 +53,13 @@ enum Kind {
     ByHand(&'static str),
     /// File of the finished tiles of an interrupted render.
     Partial,
-    /// File of a part of a picture, which `photoncard merge` joins with the others.
+    /// File of a part of a picture. `photoncard merge` joins the parts.
     Part,
     Prepared,
     Picture,
 }
 
-/// Error of a path that names a folder or is an address.
+/// Returns the error of a path that names a folder or is an address; `None` for other paths.
 pub(super) fn refused_path(path: &Path) -> Option<SceneError> {
     let text = path.to_string_lossy();
     let is_scheme =
@@ -80,7 +80,7 @@ pub(super) fn refused_path(path: &Path) -> Option<SceneError> {
     Some(other(path, "a folder", remedy))
 }
 
-/// Error of a file that is recognised as another format.
+/// Returns the error of a file that is recognised as another format; `None` if it is not.
 pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     let is_of = |((starts, endings), _): &&(Signs, Kind)| {
@@ -154,7 +154,7 @@ fn other(path: &Path, what: &'static str, remedy: String) -> SceneError {
     SceneError::OtherFormat { file: path.to_owned(), what, remedy }
 }
 
-/// Shell command by which Blender opens `file`, or runs the Python line `import`, and exports glTF.
+/// Remedy with a shell command. Blender opens `file`, or runs the Python line `import`, and exports glTF.
 fn export(file: &str, import: &str, made: &str) -> String {
     let made = python(made);
     let code = format!(

@@ -73,7 +73,6 @@ pub(super) enum Tangents {
 /// Primitive of triangles whose accessors are within bounds.
 pub(super) struct Primitive<'a> {
     pub(super) index: usize,
-    /// Number of triangles.
     pub(super) triangles: u64,
     /// True if the primitive's last vertices form no whole triangle.
     pub(super) has_incomplete: bool,
@@ -86,7 +85,7 @@ pub(super) struct Primitive<'a> {
     /// Index of the set of texture coordinates along whose u the tangents point, if the material has a normal
     /// map.
     pub(super) tangent_set: Option<usize>,
-    /// Stated tangents once they are checked, or computed ones; empty before the first instance is placed.
+    /// Checked or computed tangents; empty before the first instance is placed.
     pub(super) known_tangents: OnceCell<Tangents>,
     /// Texture coordinates of the sets that the material uses.
     pub(super) coordinates: [Option<Elements<'a>>; 2],
@@ -99,7 +98,6 @@ pub(super) struct Primitive<'a> {
     pub(super) material: u32,
 }
 
-/// Reader of the attributes of one primitive.
 struct AttributeReader<'s, 'a> {
     source: &'s Source<'a>,
     item: String,
@@ -225,7 +223,7 @@ impl<'a> Primitive<'a> {
     /// Lower bound of the card memory that each instance takes, bytes.
     ///
     /// # Errors
-    /// If the process cannot have the memory for the set of the primitive's vertex positions.
+    /// If the system refuses the memory for the set of vertex positions.
     pub(super) fn bytes_of_a_card(&self) -> Result<u64, OutOfMemory> {
         let sets = 1 + u64::from(self.coordinates[1].is_some());
         // Normals may equal the triangles' own, and colours may be white: these need no records.

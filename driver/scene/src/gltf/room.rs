@@ -1,8 +1,9 @@
-//! Lower bound of a scene's card memory, from accessors, instances and image headers, before anything is
-//! expanded.
+//! Lower bound of the memory that a scene takes on a card. It follows from accessors, instances and image
+//! headers, before geometry is expanded and images are decoded.
 //!
-//! A scene that is rejected here cannot fit a card. Others are measured once they are packed
-//! (`pack::budget`). The bound assumes full leaves, and ignores vertices that primitives share.
+//! A scene that is rejected here cannot fit a card. Other scenes are measured after they are packed
+//! (`pack::budget`). The bound assumes full leaves of the hierarchy, and ignores vertices that primitives
+//! share.
 
 use std::path::{Path, PathBuf};
 
@@ -39,8 +40,8 @@ impl Room {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// Maximum total size of all image files, bytes: 2 GB or, if it is more, 8 bytes for each texel of 4
-    /// bytes that fits the card's memory. No format takes more bytes per texel.
+    /// Maximum total size of all image files, bytes: twice the card's memory, at least 2 GiB. A texel takes 4
+    /// bytes on the card, and at most 8 bytes in any file format.
     pub(super) fn image_file_bytes(&self) -> u64 {
         self.available.saturating_mul(2).max(2 << 30)
     }
@@ -67,12 +68,13 @@ impl Room {
             >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2, true))
     }
 
-    /// Adds the card memory of all triangles of a scene, `bytes`, with their nodes and attributes.
+    /// Adds the card memory of all `triangles` triangles of a scene with their nodes and attributes: `bytes`.
     pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
         self.take(bytes, || format!("{triangles} triangles, images and materials"))
     }
 
-    /// Minimum size of leaves and nodes for triangles with `corners` distinct vertices, bytes.
+    /// Minimum size of the leaves and nodes of a hierarchy of triangles with `corners` distinct vertices,
+    /// bytes.
     pub(super) fn geometry(triangles: u64, corners: u64) -> u64 {
         let leaves = triangles.div_ceil(LEAF_TRIANGLES as u64).max(corners.div_ceil(LEAF_VERTICES as u64));
         let nodes = leaves.saturating_sub(1) / (NODE_CHILDREN as u64 - 1);

@@ -46,9 +46,10 @@ pub struct SceneFile {
     room: Room,
     /// Images that cannot be read, each with its reason.
     unreadable: Vec<String>,
-    /// Default camera of a file without cameras. It shows the scene at rest, and is computed on first use.
+    /// Default camera of a file without cameras, computed on first use. It frames the scene without
+    /// animations.
     framed: OnceLock<(Camera, Framed)>,
-    /// Offset of the scene's origin, which follows from the scene at rest and is computed on first use.
+    /// Offset of the scene's origin, computed on first use from the scene without animations.
     anchor: OnceLock<Anchor>,
 }
 
@@ -81,8 +82,8 @@ impl SceneFile {
         self.placed(self.bare.clone(), None)
     }
 
-    /// Does what [`Self::at_rest`] does, and consumes the file. A remark names the animations, which do not
-    /// play.
+    /// Does what [`Self::at_rest`] does, and consumes the file. If the file has animations, a remark says
+    /// that they do not play.
     ///
     /// # Errors
     /// As [`Self::at_rest`].
@@ -98,8 +99,8 @@ impl SceneFile {
     /// move.
     ///
     /// # Errors
-    /// As [`Self::at_rest`]; if an animation is invalid or unknown, or two that play move the same property
-    /// of a node.
+    /// As [`Self::at_rest`], and if an animation is invalid or unknown, or two animations of the moment move
+    /// the same property of a node.
     pub fn at(&self, moment: &Moment) -> Result<Scene, SceneError> {
         self.placed(self.bare.clone(), Some(moment))
     }
@@ -172,7 +173,8 @@ impl SceneFile {
         true
     }
 
-    /// Adds the contents of the nodes, at a moment or at rest, to a scene that has everything else.
+    /// Adds the meshes, lights and cameras of the nodes to a scene that has everything else. `moment` is
+    /// `None` for the scene without animations.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
         let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
         let buffers = Buffers::of(document);
@@ -202,7 +204,7 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// Default camera of a file without cameras. Its position follows from the scene at rest.
+    /// Default camera of a file without cameras. Its position follows from the scene without animations.
     fn framed(&self, scene: &Scene, moment: Option<&Moment>) -> Result<(Camera, Framed), SceneError> {
         if moment.is_some() && self.framed.get().is_none() {
             self.at_rest()?;

@@ -4,14 +4,14 @@ use photoncard_shared::budget::REFERENCE_DRAM_BYTES;
 
 use crate::LightUnits;
 
-/// Settings of the loader. [`Scene::checksum`](crate::Scene::checksum) covers all that they change in the
-/// scene.
+/// Settings of the loader. [`Scene::checksum`](crate::Scene::checksum) covers everything that these settings
+/// change in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadSettings {
     /// Memory of the cards into which the scene must fit, bytes.
     pub dram_bytes: u64,
-    /// Maximum width and height of an image, texels, at least 1. Larger images are scaled down by a whole
-    /// number, each texel to the mean in linear light. `None` keeps the sizes of the files.
+    /// Maximum width and height of an image, texels, at least 1. The sides of larger images are divided by a
+    /// whole number, and the texels are averaged in linear light. `None` keeps the sizes of the files.
     pub texture_limit: Option<u32>,
     /// Variant of the materials (`KHR_materials_variants`); `None` for the materials that the meshes state.
     pub variant: Option<String>,
@@ -19,7 +19,8 @@ pub struct LoadSettings {
     pub light_units: LightUnits,
 }
 
-/// Memory of the reference chip, images of all sizes, no variant, and units chosen by the exporter.
+/// Default settings: memory of the reference chip, images of all sizes, no variant, and units chosen by the
+/// exporter.
 impl Default for LoadSettings {
     fn default() -> Self {
         Self {

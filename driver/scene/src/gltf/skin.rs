@@ -12,7 +12,6 @@ const REMEDY: &str = "export the rigged mesh again, or apply its pose in the mod
 const MATRICES: Format =
     Format { types: &[Type::Mat4], components: &[ComponentType::F32], integers: Integers::Whole };
 
-/// Joint matrices of a skin.
 pub(super) struct Skin {
     index: usize,
     joints: Vec<DMat4>,

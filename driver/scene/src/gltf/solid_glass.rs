@@ -1,8 +1,8 @@
-//! Decides by the shape of a mesh whether its glass is solid or thin-walled, whatever the material states.
+//! Decides by the shape of a mesh whether its glass is solid or thin-walled.
 //!
-//! Blender writes no thickness although its users mean solids: closed parts of its meshes therefore bound
-//! volumes. A flat sheet bounds none: it becomes a thin wall with the thickness of its material. A material
-//! that occurs in several forms is copied for each.
+//! Blender writes no thickness although its users mean solids. In its files, closed parts of glass meshes
+//! therefore bound volumes. In all files, a flat sheet of glass with a thickness becomes a thin wall of that
+//! thickness. A material that occurs in several forms is copied for each form.
 
 use std::collections::BTreeMap;
 
@@ -16,14 +16,14 @@ use crate::{Material, Reflection, Scene, Transmission, Triangle, parts};
 
 /// Memory per edge of a triangle while edges are matched, bytes.
 const BYTES_OF_AN_EDGE: u64 = 64;
-/// Maximum ratio of stated thickness to extent of a sheet. Water surfaces exceed it, because their thickness
-/// is the depth of the water.
+/// Maximum ratio of a sheet's stated thickness to its extent at which it becomes a thin wall. Water surfaces
+/// exceed it, because their thickness is the depth of the water.
 const THIN: f32 = 0.1;
-/// Tolerances of flatness: the maximum distance from the plane is the first times the extent plus the second
-/// times the greatest coordinate.
+/// Tolerances of flatness: the maximum distance from the plane is `UNEVEN[0] extent + UNEVEN[1] c`, where c
+/// is the greatest absolute coordinate.
 const UNEVEN: [f32; 2] = [1e-4, 1e-6];
 
-/// Names of materials, by the change of their surfaces.
+/// Names of glass materials, by what became of some of their surfaces.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Resolved {
     /// Materials whose closed parts became solid.
@@ -47,11 +47,11 @@ enum Form {
     Open,
 }
 
-/// Makes closed parts of glass without a thickness solid, in files of Blender. Makes flat sheets of glass
-/// with a thickness thin walls, in all files.
+/// Makes closed parts of glass meshes solid if their material states no thickness, in files of Blender. Makes
+/// flat sheets of glass thin-walled if their material states a thickness, in all files.
 ///
 /// # Errors
-/// If the process cannot have the memory for the edges.
+/// If the system refuses the memory for the edges.
 pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved, SceneError> {
     let is_considered: Vec<bool> = scene
         .materials
@@ -149,7 +149,7 @@ fn stated_thickness(document: &Document, material: usize) -> f32 {
     document.root.materials.get(material).and_then(of).unwrap_or(0.0)
 }
 
-/// Length of the diagonal of the triangles' bounding box.
+/// Extent of triangles: the length of the diagonal of their bounding box, metres.
 fn extent<'a>(triangles: impl Iterator<Item = &'a [Vec3; 3]>) -> f32 {
     let bounds = triangles.flatten().map(|&corner| [corner, corner]);
     let bounds = bounds.reduce(|[lower, upper], [corner, _]| [lower.min(corner), upper.max(corner)]);

@@ -19,8 +19,8 @@ struct Node {
     matrix: Option<[f64; 16]>,
 }
 
-/// Reads the translation of each node from the JSON, that of its matrix if it has one; `None` for nodes with
-/// neither.
+/// Reads the translation of each node from the JSON: the last column of its matrix or, without one, its
+/// `translation`. `None` for nodes with neither.
 pub(super) fn read(document: &Document) -> Vec<Option<DVec3>> {
     let parsed = foreign::decode(|| Ok(serde_json::from_str(document.text()).ok()), || ());
     let File { nodes } = parsed.ok().flatten().unwrap_or(File { nodes: Vec::new() });

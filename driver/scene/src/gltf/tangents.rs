@@ -73,7 +73,8 @@ impl VertexReader<'_, '_> {
         )
     }
 
-    /// World-space tangents of a triangle's corners with these normals.
+    /// Transforms the tangents of a triangle's corners to world space. The results are perpendicular to
+    /// `normals`.
     pub(super) fn placed_tangents(
         &self,
         tangents: &Tangents,

@@ -16,7 +16,7 @@ use crate::error::SceneError;
 use crate::raster::Deep;
 use crate::{Encoding, Material, Scene, Texture, Wrap};
 
-/// Maximum absolute value in a texture transform. With greater ones single precision cannot resolve texels.
+/// Maximum absolute value in a texture transform. Beyond it, single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
 
 /// Channels of a texture that a material uses.
@@ -163,14 +163,14 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// New index of each element once those that are not kept are removed; `None` for a removed one.
+/// New index of each element after all elements that are not kept are removed; `None` for a removed one.
 fn renumbered(is_kept: &[bool]) -> Vec<Option<u32>> {
     let mut next = 0..;
     is_kept.iter().map(|kept| kept.then(|| next.next()).flatten()).collect()
 }
 
-/// Renumbers the textures of a material, or removes them. It destructures all fields, so that a new one
-/// cannot be forgotten.
+/// Renumbers the textures of a material, or removes them. All fields are destructured, so that the compiler
+/// reports a new field that is not handled.
 fn renumber(material: &mut Material, indices: &[Option<u32>]) {
     let Material {
         name: _,

@@ -4,7 +4,6 @@ use gltf::json;
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 
-/// Topology of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Topology {
     List,
@@ -47,7 +46,7 @@ impl Topology {
     }
 }
 
-/// Returns whether a primitive has positions. The meaning of one without is up to extensions.
+/// Returns whether a primitive has positions. Only extensions define primitives without positions.
 pub(super) fn has_positions(primitive: &json::mesh::Primitive) -> bool {
     primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions))
 }

@@ -33,7 +33,6 @@ pub(super) struct Corners<'p> {
     pub(super) weights: &'p [f32],
 }
 
-/// Reader of the vertices of one primitive.
 pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
     pub(super) mesh: usize,

@@ -1,5 +1,5 @@
-//! Streams of attributes, versions 0 and 1. Elements are coded in blocks; byte i of all elements of a block
-//! is lane i, stored as differences.
+//! Decoder of attribute streams, versions 0 and 1. Elements are coded in blocks. Lane i of a block is byte i
+//! of each element, stored as differences between successive elements.
 
 /// Number of elements whose differences share a bit width.
 const GROUP: usize = 16;
@@ -13,11 +13,11 @@ const BLOCK_BYTES: usize = 8192;
 /// First bytes of streams of versions 0 and 1.
 const HEADERS: [u8; 2] = [0xa0, 0xa1];
 
-/// Minimum size of the tail in each version, bytes.
+/// Minimum size of the tail of a stream (first baseline and channel modes) in versions 0 and 1, bytes.
 const TAILS: [usize; 2] = [32, 24];
 
-/// Bit widths of a group of differences, by its two-bit code: of version 0, and of the first two lane modes
-/// of version 1.
+/// Bit width of a group's differences by the group's two-bit code: in version 0, and in lane modes 0 and 1 of
+/// version 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
 /// Lane mode of version 1 whose differences are all zero.
@@ -68,7 +68,7 @@ fn read_lanes(
     Some(())
 }
 
-/// Reads a lane whose groups have different bit widths.
+/// Reads a lane in groups. Each group has one of the four bit widths.
 fn read_groups(stream: &mut &[u8], widths: [u32; 4], lane: &mut [u8]) -> Option<()> {
     let codes = stream.split_off(..(lane.len() / GROUP).div_ceil(4))?;
     for (index, group) in lane.chunks_exact_mut(GROUP).enumerate() {
@@ -99,8 +99,8 @@ fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// Adds the differences at `index` of each lane to the last element, which becomes the next one. `channels`
-/// has the mode of each four bytes; it is empty in version 0.
+/// Adds the differences at `index` of each lane to `last`, which changes from the last element to the next
+/// one. `channels` has one mode for each four bytes of an element; it is empty in version 0.
 fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mut [u8]) -> Option<()> {
     for (channel, word) in last.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let difference = [0, 1, 2, 3].map(|byte| lanes[(4 * channel + byte) * lane_bytes + index]);

@@ -1,4 +1,5 @@
-//! Filters of decoded attributes. Values that the extension leaves undefined give any number, never a panic.
+//! Filters of decoded attributes. Input for which the extension defines no result gives any number, but no
+//! panic.
 
 use serde::Deserialize;
 
@@ -48,7 +49,7 @@ pub(super) fn apply(filter: Filter, stride: usize, decoded: &mut [u8]) {
     }
 }
 
-/// Replaces elements of four bytes each.
+/// Applies `filter` to elements of four bytes each, in place.
 fn bytes<R: IntoIterator<Item = u8>>(decoded: &mut [u8], filter: impl Fn([u8; 4]) -> R) {
     for element in decoded.as_chunks_mut::<4>().0 {
         let filtered = filter(*element);
@@ -56,7 +57,7 @@ fn bytes<R: IntoIterator<Item = u8>>(decoded: &mut [u8], filter: impl Fn([u8; 4]
     }
 }
 
-/// Replaces elements of four 16-bit integers each.
+/// Applies `filter` to elements of four 16-bit integers each, in place.
 fn halves<R: IntoIterator<Item = u16>>(decoded: &mut [u8], filter: impl Fn([u16; 4]) -> R) {
     for element in decoded.as_chunks_mut::<8>().0 {
         let halves = element.as_chunks_mut::<2>().0;
@@ -103,8 +104,8 @@ fn float(word: [u8; 4]) -> [u8; 4] {
     libm::ldexpf(mantissa as f32, word >> 24).to_le_bytes()
 }
 
-/// Decodes a colour from luma, its differences to orange and green, and alpha, and scales it by `whole`. The
-/// highest set bit of alpha states the scale of the code.
+/// Decodes a YCoCg colour (luma, chroma orange, chroma green) with alpha, and scales it by `whole`. If bit b
+/// is the highest set bit of alpha, the code of 1 is `2^(b + 1) - 1`.
 fn colour([luma, orange, green, alpha]: [i32; 4], whole: f32) -> [f32; 4] {
     let bit = alpha.checked_ilog2().unwrap_or(0);
     let one = (2 << bit) - 1;

@@ -1,9 +1,9 @@
-//! Streams of indices.
+//! Decoder of index streams.
 
 const TRIANGLES_HEADER: u8 = 0xe1;
 const SEQUENCE_HEADER: u8 = 0xd1;
 
-/// Size of the table after the triangles, bytes.
+/// Size of the table of codes at the end of a stream of triangles, bytes.
 const TABLE: usize = 16;
 
 /// Size of the padding after a sequence, bytes.
@@ -12,8 +12,8 @@ const PADDING: usize = 4;
 /// Maximum size of an integer of variable length, bytes.
 const MAX_VARIABLE: u32 = 5;
 
-/// Ring of the last sixteen values, with the number of values pushed. Its initial values are no index of a
-/// vertex.
+/// Ring of the last sixteen values, with the number of values pushed so far. It initially holds no valid
+/// vertex index.
 struct Recent<T>([T; 16], usize);
 
 impl<T: Copy> Recent<T> {
@@ -86,14 +86,15 @@ impl Triangles<'_> {
         Some([a, b, c])
     }
 
-    /// Decodes a triangle whose first index is a new one. `code` has four bits for each of the other two.
+    /// Decodes a triangle whose first vertex is the next new one. `code` has four bits for each of the other
+    /// two.
     fn fresh(&mut self, code: u8) -> Option<[u32; 3]> {
         let a = self.fresh_index();
         self.complete(a, code)
     }
 
-    /// Decodes a triangle whose code is the next byte of the data; with `is_stated` the difference of its
-    /// first index follows.
+    /// Decodes a triangle whose code is the next byte of the data. If `is_stated`, its first index follows as
+    /// a difference.
     fn stated(&mut self, is_stated: bool) -> Option<[u32; 3]> {
         let code = *self.data.split_off_first()?;
         if code == 0 {
@@ -177,7 +178,7 @@ fn signed(code: u32) -> u32 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }
 
-/// Writes an index of two or four bytes; `None` if it takes more.
+/// Writes an index to `place`, two or four bytes; `None` if the index takes more.
 fn write(place: &mut [u8], index: u32) -> Option<()> {
     let bytes = index.to_le_bytes();
     let (low, high) = bytes.split_at_checked(place.len())?;

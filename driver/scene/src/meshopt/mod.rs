@@ -1,7 +1,8 @@
 //! Decoder of buffer views compressed by meshopt (`EXT_meshopt_compression`, `KHR_meshopt_compression`).
 //!
 //! The decoded size is checked against the maximum for the stream's length before memory is allocated. A
-//! damaged stream gives an error or wrong bytes; readers of accessors check the bytes as those of any buffer.
+//! damaged stream gives an error or wrong bytes; the reader of accessors checks these bytes like those of any
+//! buffer.
 
 mod attributes;
 mod filter;
@@ -12,8 +13,8 @@ use serde::Deserialize;
 pub(super) use self::filter::Filter;
 use photoncard_picture::allocation::{self, OutOfMemory};
 
-/// Maximum number of decoded bytes per byte of a stream. A byte of control bits codes four lanes of 256
-/// elements.
+/// Maximum number of decoded bytes per byte of a stream. A byte of control bits codes four bytes of each of
+/// 256 elements.
 const EXPANSION: u64 = 4 * 256;
 
 /// Maximum size of an element, bytes.
@@ -34,7 +35,6 @@ pub(super) enum Mode {
 /// Size of the decoded elements, and the format of their stream.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    /// Number of elements.
     pub(super) count: usize,
     /// Size of an element, bytes.
     pub(super) stride: usize,
@@ -48,7 +48,7 @@ pub(super) enum Fault {
     /// Damage of the stream, or a combination of sizes, mode and filter that the extension does not allow,
     /// described as a clause.
     Invalid(String),
-    /// Memory that the process cannot have.
+    /// Memory that the system refuses.
     Memory(OutOfMemory),
 }
 

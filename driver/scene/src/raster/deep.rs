@@ -2,7 +2,7 @@
 
 use crate::texture::{Encoding, shared_exponent};
 
-/// Encoding of 16-bit images in four bytes that keeps more than 8 bits of some channels.
+/// Encoding of a 16-bit image in four bytes per texel that keeps more than 8 bits of some channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Deep {
     /// Colour in sRGB, as [`Encoding::SharedExponent`].
@@ -47,7 +47,7 @@ fn linear(code: u16) -> f32 {
 }
 
 /// Encodes x and y of a normal after normalisation. A normal with z < 0 is moved into the surface (z = 0),
-/// because z is not stored; images of 8 bits per channel keep it.
+/// because z is not stored. Images of 8 bits per channel keep such normals.
 fn normal(codes: [u16; 3]) -> [u8; 4] {
     const HALF: f64 = u16::MAX as f64 / 2.0;
     let [x, y, z] = codes.map(|code| f64::from(code) - HALF);

@@ -16,7 +16,7 @@ pub(crate) struct Fault {
 const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
 
 impl Fault {
-    /// Error of an image whose memory the process cannot have.
+    /// Creates the error of memory that an image needs and the system refuses.
     pub(crate) fn memory(error: OutOfMemory) -> Self {
         Self {
             reason: format!("decoding it takes much memory: {error}"),
@@ -25,7 +25,7 @@ impl Fault {
         }
     }
 
-    /// Error of an image that is damaged or unsupported, not too large.
+    /// Creates the error of an image that is damaged or unsupported, not too large.
     pub(crate) fn unreadable(reason: impl Into<String>, remedy: &'static str) -> Self {
         Self { reason: reason.into(), remedy, is_limit: false }
     }

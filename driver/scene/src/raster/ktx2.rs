@@ -2,8 +2,8 @@
 //! with or without Zstandard.
 //!
 //! The transcoder allocates what a file's header states, and decodes more formats than glTF allows. The
-//! header is therefore checked here first. Zstandard is decoded here as well, to the length that follows from
-//! the size.
+//! header is therefore checked here first. Zstandard is decoded here as well; the image's size determines the
+//! decoded length.
 
 use std::array;
 use std::borrow::Cow;
@@ -125,7 +125,7 @@ fn words<const N: usize>(bytes: &[u8]) -> Option<[u32; N]> {
     Some(array::from_fn(|word| u32::from_le_bytes(array::from_fn(|byte| bytes[4 * word + byte]))))
 }
 
-/// Bytes of a file at `offset`; an error if they exceed the file.
+/// Returns `length` bytes of a file from `offset`; an error if they exceed the file.
 fn part(bytes: &[u8], offset: u64, length: u64) -> Result<&[u8], Fault> {
     let part = || bytes.get(usize::try_from(offset).ok()?..)?.get(..usize::try_from(length).ok()?);
     part().ok_or_else(|| Fault::damaged("its header refers to bytes beyond its end"))
@@ -175,7 +175,7 @@ fn value<'a>(mut metadata: &'a [u8], key: &str) -> Option<&'a [u8]> {
     }
 }
 
-/// Width and height, and the maximum number of texels in a file of this length. There is no such maximum for
+/// Width and height, and the maximum number of texels in a file of this length. The maximum is `u64::MAX` for
 /// ETC1S, whose blocks may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let header = Header::read(bytes)?;

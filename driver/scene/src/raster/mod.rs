@@ -21,7 +21,7 @@ use photoncard_picture::foreign;
 /// coefficients of a progressive JPEG.
 const DECODING_BYTES: u64 = 16;
 
-/// Runs a decoder and reports its panic as a damaged file.
+/// Runs a decoder. If the decoder panics, the error is that of a damaged file.
 pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     foreign::decode(decoder, || Fault::damaged("its structure contradicts itself"))
 }

@@ -13,7 +13,6 @@ const CHUNK_HEADER: usize = 8;
 /// Mask of the bits of a width or height in the headers of both codecs.
 const SIDE: u32 = 0x3fff;
 
-/// Returns whether a file is WebP.
 pub(super) fn is_webp(bytes: &[u8]) -> bool {
     bytes.starts_with(b"RIFF") && bytes.get(8..FILE_HEADER) == Some(b"WEBP")
 }
@@ -26,8 +25,8 @@ fn decoder(bytes: &[u8]) -> Result<WebPDecoder<Cursor<&[u8]>>, Fault> {
     Ok(decoder)
 }
 
-/// Width and height, and the maximum number of texels in a file of this length. There is no such maximum,
-/// because texels of one colour may take no bits.
+/// Width and height, and `u64::MAX`: the length of the file does not limit the number of texels, because
+/// texels of one colour may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let size = decoder(bytes)?.dimensions().into();
     // The decoder allocates by the size in the codec's header before it compares that size with the file's.

@@ -8,7 +8,7 @@ use crate::limits::{BRIGHTEST, EMISSION};
 use crate::out_of_range::every;
 use crate::{Environment, PunctualKind, PunctualLight};
 
-/// Reason and remedy of an impossible value.
+/// Reason why a value is refused, and remedy.
 pub(super) type Refusal = (&'static str, &'static str);
 
 /// Property of a light that can be assigned.
@@ -28,8 +28,8 @@ impl LightProperty {
 }
 
 impl PunctualLight {
-    /// Colour whose greatest channel is 1, and the intensity of that channel. A light of intensity 0 counts
-    /// as white.
+    /// Splits the intensity into a colour whose greatest channel is 1, and the intensity of that channel. A
+    /// light of intensity 0 counts as white.
     pub fn colour(&self) -> (Vec3, f32) {
         let greatest = self.intensity.max_element();
         if greatest > 0.0 { (self.intensity / greatest, greatest) } else { (Vec3::ONE, 0.0) }
@@ -107,7 +107,8 @@ impl Environment {
     /// Sets the factor of the texels.
     ///
     /// # Errors
-    /// Reason and remedy, if the environment would exceed the maximum radiance.
+    /// Reason and remedy, if the values are not one number of 0 or more, or it or a texel would exceed
+    /// [`BRIGHTEST`].
     pub(super) fn set_strength(&mut self, values: &[f32]) -> Result<(), Refusal> {
         let &[strength] = values else {
             return Err(("the strength is one number", "write environment.strength=2 for twice the map"));

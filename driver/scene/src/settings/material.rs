@@ -33,7 +33,7 @@ impl MaterialProperty {
         ("emission", Self::Emission),
     ];
 
-    /// Name of the property in an error; `None` if its value is a colour.
+    /// Name of the property in an error message; `None` for a property whose value is a colour.
     pub(super) fn as_number(self) -> Option<&'static str> {
         match self {
             Self::Exponent => Some("the exponent"),
@@ -49,10 +49,11 @@ impl MaterialProperty {
 }
 
 impl Material {
-    /// Sets a property.
+    /// Sets a property to one number, or to a colour of three.
     ///
     /// # Errors
-    /// Reason and remedy, if the material lacks the property.
+    /// Reason and remedy, if the material lacks the property, or the value is no valid thickness or index of
+    /// refraction.
     pub(super) fn assign(
         &mut self,
         property: MaterialProperty,
@@ -151,8 +152,8 @@ impl Material {
 }
 
 impl Reflection {
-    /// Index of refraction: that of the transmission or, without one, the one that F0 implies. `None` for a
-    /// Phong reflection.
+    /// Index of refraction: that of the transmission or, for an opaque material, the one that F0 and F90
+    /// imply. `None` for a Phong reflection.
     pub fn ior(&self) -> Option<f32> {
         match *self {
             Self::Phong { .. } => None,
@@ -170,7 +171,7 @@ fn f0(ior: f32) -> f32 {
     amplitude * amplitude
 }
 
-/// Index of refraction of a dielectric with this F0 and F90; 1.5 for one without reflectance.
+/// Index of refraction of a dielectric with this F0 and F90; 1.5 if F90 is 0.
 fn index_of_refraction(f0: Vec3, f90: f32) -> f32 {
     if f90 <= 0.0 {
         return 1.5;

@@ -42,7 +42,6 @@ impl Property {
     }
 }
 
-/// Parsed assignment.
 struct Assignment<'a> {
     text: &'a str,
     name: &'a str,
@@ -75,30 +74,29 @@ fn fault(assignment: &str, reason: String, remedy: &'static str) -> SceneError {
 }
 
 impl Scene {
-    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name, `LIGHT.PROPERTY=VALUE` to every light
-    /// without extent of the name, or `environment.strength=VALUE`.
+    /// Applies one assignment: `MATERIAL.PROPERTY=VALUE` to all materials of the name, `LIGHT.PROPERTY=VALUE`
+    /// to all point, spot and directional lights of the name, or `environment.strength=VALUE`.
     ///
-    /// The property of a material is `diffuse` (the diffuse albedo, or the base colour of a
-    /// metallic-roughness material), `alpha` (the coverage of a material without cut-outs) or `emission` of
-    /// any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
-    /// `metallic`, `roughness`, `ior` (index of refraction, which also replaces the colour of the
-    /// reflectance), `transmission` or `thickness` (above 0: the surface bounds a solid) of a
-    /// metallic-roughness one. Colours are `r,g,b` or one number for all three, the others one number.
-    /// Textures still multiply the values. The emissive texture of a material that did not emit was not
-    /// loaded; a notice says so.
+    /// Properties of every material are `diffuse` (the diffuse albedo, or the base colour of a
+    /// metallic-roughness material), `alpha` (the coverage of a material without cut-outs) and `emission`. A
+    /// Lambertian or Phong material also has `specular` and `exponent`. A metallic-roughness material also
+    /// has `metallic`, `roughness`, `ior` (index of refraction, which also makes the reflectance colourless),
+    /// `transmission` and `thickness` (above 0: the surface bounds a solid). Colours are `r,g,b`, or one
+    /// number for all three channels; other values are one number. Textures still multiply the values. The
+    /// emissive texture of a material that did not emit was not loaded; a notice says so.
     ///
-    /// The property of a light is `colour` (only the ratios of its channels count), `intensity` (of the
-    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and is white for a dark
-    /// light) or `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light with a
-    /// unique name). The strength of the environment is a factor of its map.
+    /// Properties of a light are `colour` (only the ratios of its channels count), `intensity` (of the
+    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and a light of intensity 0
+    /// counts as white) and `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light
+    /// with a unique name). The strength of the environment is a factor of its texels.
     ///
     /// Materials and lights have no property in common, so that a material and a light may have the same
     /// name. A name may itself contain dots. [`Scene::check_light`] checks that the scene still has a light
     /// once all assignments are applied.
     ///
     /// # Errors
-    /// If the text is not of this form, nothing with the property has the name, a material or light lacks the
-    /// property, or a value would be out of range; the scene stays as it was.
+    /// If the text is not of this form, the scene has no material, light or environment of the name, it lacks
+    /// the property, or a value would be out of range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let assignment = Assignment::parse(assignment)?;
         match assignment.property {

@@ -1,4 +1,4 @@
-//! Proposals for an unknown name.
+//! Proposals of known names for an unknown one.
 
 /// Maximum number of names that an error proposes.
 const PROPOSED: usize = 5;

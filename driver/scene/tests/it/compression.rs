@@ -119,8 +119,8 @@ fn impossible_streams_are_refused() {
     for (file, name) in FILES {
         for (part, change) in &cases {
             let (mut json, bytes) = parts(file);
-            // The view's own stride is removed, because it would be refused before another stride or mode of
-            // the extension.
+            // The view's own stride is removed, because it would be refused before the stride or mode that
+            // the test changes in the extension.
             json["bufferViews"][0].as_object_mut().unwrap().remove("byteStride");
             change(&mut json, name);
             let Err(error) = load_parts(&(json, bytes)) else { panic!("{part} was loaded") };

@@ -38,7 +38,6 @@ fn extension(json: &mut Value) -> &mut Value {
     &mut primitive(json)["extensions"][NAME]
 }
 
-/// Returns the accessor of an attribute.
 fn accessor<'v>(json: &'v mut Value, name: &str) -> &'v mut Value {
     let index = primitive(json)["attributes"][name].as_u64().unwrap() as usize;
     &mut json["accessors"][index]

@@ -1,4 +1,4 @@
-//! Glass in glTF files is solid or thin-walled by the shape of each mesh, whatever other meshes have its
+//! Glass in glTF files is solid or thin-walled according to the shape of each mesh, even if meshes share a
 //! material.
 
 use photoncard_scene::{Reflection, Scene, Transmission};
@@ -95,7 +95,7 @@ fn a_flat_sheet_with_a_thickness_is_a_thin_wall_beside_a_solid() {
     }
 }
 
-/// A stated thickness that is the depth of the water does not make its surface a thin wall.
+/// A water surface whose thickness is the depth of the water does not become a thin wall.
 #[test]
 fn a_sheet_of_great_thickness_and_an_open_mesh_stay_surfaces_of_a_volume() {
     let volume = |thickness: f32| json!({"thicknessFactor": thickness});

@@ -156,8 +156,8 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// Many nodes may share a list of instances at almost no cost in bytes, so that a list without triangles is
-/// not traversed. Traversing this one would be an error, because its rotations are zero.
+/// A mesh without triangles does not traverse its list of instances, because many nodes can share a long
+/// list. This list is invalid: traversing it would be an error, because its rotations are zero.
 #[test]
 fn instances_of_points_are_not_traversed() {
     let mut scene = Extended::new();

@@ -1,9 +1,10 @@
-//! Load balance of many chips: simulates the scheduler with the costs of a picture's tiles.
+//! Load balance of many chips: simulates the scheduler with the render time of each tile of a picture.
 //!
-//! The real [`Scheduler`] assigns tiles, with the policy of [`photoncard_cards::session`]: there is one
-//! queue. When the host turns to a card, it sends as many tiles as the card has free credits. A chip renders
-//! its tiles in the order of arrival. A tile frees its credit when its result arrives at the host. A chip is
-//! done with a tile when it has rendered it; the time to send the result belongs to the link.
+//! The real [`Scheduler`] assigns tiles from one queue, with the policy of [`photoncard_cards::session`]. A
+//! card has a number of credits, one for each tile command that may be unanswered. When the host serves a
+//! card, it sends a tile for each free credit. A chip renders its tiles in the order of arrival. A tile frees
+//! its credit when its result arrives at the host. A chip is done with a tile when it has rendered it; the
+//! time to send the result belongs to the link.
 //!
 //! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a
 //! simulation gives the same result on every machine.
@@ -33,12 +34,10 @@ pub(crate) struct LinkModel {
 /// Number of chips, their credits and their links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Setup {
-    /// Number of chips.
     pub(crate) chips: usize,
     /// Maximum number of unanswered tile commands per chip
     /// ([`Budget::tiles`](photoncard_shared::budget::Budget::tiles)).
     pub(crate) credits: usize,
-    /// Model of the links.
     pub(crate) link: LinkModel,
 }
 
@@ -51,7 +50,6 @@ pub(crate) enum LoadBalanceError {
     /// The machine has no chips or no credits.
     #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
     NoChips {
-        /// Number of chips.
         chips: usize,
         /// Maximum number of unanswered tile commands per chip.
         credits: usize,
@@ -61,7 +59,7 @@ pub(crate) enum LoadBalanceError {
     Time(f64),
 }
 
-/// Maximum time of a tile or a message, seconds. With it, sums of nanoseconds stay exact.
+/// Maximum time of a tile or a message, seconds. Sums of nanoseconds stay exact below this limit.
 pub(crate) const MAX_SECONDS: f64 = 1e9;
 
 /// Result of a simulation that begins at time 0, when the host assigns the first tile.
@@ -87,14 +85,14 @@ impl Balance {
         if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
     }
 
-    /// Parallel efficiency, `speedup / chips`: fraction of the chips' time until the makespan that they spend
-    /// on rendering.
+    /// Parallel efficiency, `speedup / chips`: fraction of the makespan that chips spend on rendering, on
+    /// average.
     pub(crate) fn efficiency(&self) -> f64 {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
-    /// Idle fraction, `1 - efficiency`: fraction of the chips' time until the makespan in which they wait for
-    /// tiles, or for the last chip to finish.
+    /// Idle fraction, `1 - efficiency`: fraction of the makespan that chips spend on waiting, on average, for
+    /// tiles or for the last chip to finish.
     pub(crate) fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
     }
@@ -165,8 +163,8 @@ impl Simulation {
         for chip in 0..self.chips.len() {
             self.deal(chip);
         }
-        // The result of a tile arrives later than the result that freed the tile's credit. The first result
-        // in the heap is therefore always the next one.
+        // A tile's result arrives later than the result that freed the tile's credit, so that no new result
+        // precedes those already handled.
         while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
@@ -229,7 +227,7 @@ fn seconds(nanoseconds: u128) -> f64 {
 /// Order in which tiles are assigned to chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum TileOrder {
-    /// Row by row, as the driver assigns tiles with modelled memory.
+    /// Row by row, as the driver assigns tiles if it models the chips' memory.
     #[default]
     Picture,
     /// Random permutation with this seed.

@@ -8,8 +8,8 @@ pub(crate) const FIGURES: &str = "figures.csv";
 /// A key figure of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Name of the quantity, with hyphens between words and dots between levels. It is unique together with
-    /// [`Self::scene`].
+    /// Name of the quantity, such as `check.bytes.photon-map.sort`: levels are joined by dots, words by
+    /// hyphens. No two figures of a run have the same name and the same [`Self::scene`].
     pub name: String,
     /// Name of the scene; empty if the figure belongs to no scene.
     pub scene: String,
@@ -68,8 +68,8 @@ pub(crate) fn slug(name: &str) -> String {
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// Maximum length of a name, bytes. With an extension and a hash it stays within the 255 bytes that common
-/// file systems allow.
+/// Maximum length of a name, bytes. A name with a hash and an extension then has less than the 255 bytes that
+/// common file systems allow.
 const LONGEST: usize = 100;
 
 /// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not

@@ -1,4 +1,4 @@
-//! Reports as HTML: one page with the results, and the provenance by which they can be reproduced.
+//! Reports as HTML: one page with the results, and with the versions and settings that reproduce them.
 
 use std::fmt::Write;
 
@@ -29,7 +29,6 @@ pub(crate) struct Report {
 /// A part of a report under one heading.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Section {
-    /// Text of the heading.
     pub(crate) heading: String,
     /// Blocks in reading order.
     pub(crate) blocks: Vec<Block>,
@@ -42,7 +41,6 @@ pub(crate) enum Block {
     Paragraph(String),
     /// A link to a page in this folder or a folder below.
     Link {
-        /// Text of the link.
         text: String,
         /// Path of the linked page, relative to this one.
         target: String,
@@ -51,14 +49,12 @@ pub(crate) enum Block {
     Table {
         /// Name of the file without its extension.
         name: String,
-        /// The table.
         table: Table,
     },
     /// A plot. It is also stored in the file `<name>.svg` beside the page.
     Plot {
         /// Name of the file without its extension.
         name: String,
-        /// The plot.
         plot: Plot,
     },
 }

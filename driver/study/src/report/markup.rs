@@ -19,7 +19,7 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A strict reader of the markup in reports. It panics on malformed documents.
+/// A strict parser of the markup in reports. It panics on malformed documents.
 #[cfg(test)]
 pub(super) mod reader {
     /// A start tag or empty tag, and the text up to the next tag.

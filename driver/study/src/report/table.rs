@@ -156,12 +156,12 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// The title.
     pub(crate) fn title(&self) -> &str {
         &self.title
     }
 
-    /// Encodes the table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
+    /// Encodes the table as CSV (RFC 4180), with `name (unit)` of each column in the header, and numbers in
+    /// full precision.
     ///
     /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are
     /// written `NaN`, `inf` and `-inf`.

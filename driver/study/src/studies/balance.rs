@@ -4,7 +4,8 @@ use super::super::load_balance::{Balance, LinkModel, Setup, TileOrder, simulate}
 use super::super::report::{Panel, Point, XScale, YScale};
 use super::present::{panel, series};
 
-/// A policy of assigning tiles: its name, the order of the tiles, and the credits of a chip.
+/// A policy of assigning tiles: its name, the order of the tiles, and the maximum number of unanswered tile
+/// commands of a chip (its credits).
 pub(super) type Dealing = (&'static str, TileOrder, usize);
 
 /// Policies that differ in the credits of a chip. Tiles are in the picture's order.
@@ -31,8 +32,8 @@ pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) 
     simulate(seconds, order, &Setup { chips, credits, link: LinkModel::default() }).ok()
 }
 
-/// Panel of a plot over the number of chips, with one line per policy. Its vertical axis has the given label
-/// and scale, and the function computes the plotted value.
+/// Panel of a plot over the number of chips, with one line per policy. The last argument has the label and
+/// the scale of the vertical axis, and the function that computes the plotted value.
 pub(super) fn curves(
     title: &str,
     seconds: &[f64],

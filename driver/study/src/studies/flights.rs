@@ -1,4 +1,5 @@
-//! Tiles in flight: traffic of whole frames in which gathers of several tiles wait in a chip's queue at once.
+//! Study of tiles in flight: memory traffic of whole frames, in which the gathers of one or of several tiles
+//! wait in a chip's queue at once.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::{LARGE, REFERENCE};
@@ -22,7 +23,7 @@ pub(super) struct Setup {
     scene_cache: u32,
 }
 
-/// The reference chip, whose queue is drained at the end of each tile.
+/// The reference chip with one tile in flight: it empties its gather queue at the end of each tile.
 const ON_REFERENCE: Setup =
     Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes };
 /// The large chip with the maximum number of tiles in flight.

@@ -1,4 +1,5 @@
-//! Headline figures over the nominal range of photons: naive order, exact reordering, and all techniques.
+//! Headline figures: bytes from DRAM by the number of photons, in the naive order, with exact reordering, and
+//! with all techniques.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonLayout;
@@ -17,7 +18,7 @@ const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")]
 /// Bytes per gather in the dissertation's naive order.
 const PUBLISHED_GATHER_BYTES: f64 = 14_000.0;
 
-/// A line: its name, and its point for a scene and a number of photons.
+/// A kind of render: its name, and its point for a scene and a number of photons.
 type Line = (&'static str, fn(&Scale, &str, usize) -> Point);
 
 const NAIVE: Line = ("naive", |scale, scene, photons| {
@@ -47,7 +48,7 @@ fn photons(scale: &Scale) -> Vec<usize> {
     scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
 }
 
-/// A line at one scene and one number of photons. It determines a point.
+/// A kind of render with one scene and one number of photons. They determine a point.
 struct Headline {
     scene: &'static str,
     scene_name: &'static str,
@@ -81,7 +82,7 @@ impl Headline {
         measured.photon_map_bytes().value / measured.gathers().value
     }
 
-    /// Ratio of the bytes of the naive order to those of this line, with the same scene and number of
+    /// Ratio of the bytes of the naive order to those of this render, with the same scene and number of
     /// photons.
     fn factor(&self, scale: &Scale, results: &Results) -> Ratio {
         let naive = Self { line: NAIVE, ..*self };

@@ -22,7 +22,7 @@ const RATE: f64 = 30.0;
 const MAX_CHIPS: usize = 64;
 /// Numbers of chips in the table of uploads.
 const CHIPS: [u64; 3] = [3, 16, 64];
-/// Numbers of photons of the frames, as multiples of the scale's.
+/// Numbers of photons of the frames, as multiples of the scale's number.
 const PHOTONS: [usize; 3] = [1, 4, 12];
 /// Fractions of the photons that are traced anew.
 const SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
@@ -121,7 +121,7 @@ impl Demand {
     }
 }
 
-/// Time of an upload of `bytes` bytes to all chips, seconds.
+/// Time to send `bytes` bytes to all chips with the distribution `way`, seconds.
 fn upload(way: Distribution, bytes: u64, chips: u64, machine: &Machine) -> f64 {
     way.seconds(bytes as f64, chips, &Symbols::NOMINAL, machine)
 }
@@ -291,15 +291,15 @@ fn changed_lines(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
     ]
 }
 
-/// Fraction of the photons whose lines all chips can receive within a frame, if an equal fraction of the
-/// map's lines changes.
+/// Maximum fraction of the photons that can be replaced, if all chips are to receive the changed lines within
+/// the time of a frame, and the same fraction of the map's lines changes.
 fn fitting_share(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, machine);
     (bytes / host.map.bytes.max(1) as f64).min(1.0)
 }
 
-/// Maximum measured fraction of the photons whose changed lines all chips can receive within a frame; 0 if
-/// none fits.
+/// Maximum of the measured fractions of replaced photons whose changed lines all chips can receive within the
+/// time of a frame; 0 if there is none.
 fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let fits = |bytes| upload(way, bytes, chips, machine) <= 1.0 / RATE;
     let shares = host.changes.iter().filter_map(|changed| match changed.change {

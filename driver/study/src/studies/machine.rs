@@ -1,5 +1,5 @@
-//! Study of Table 7.1: number of chips that a frame rate needs, by the table's symbols and by measured
-//! counts.
+//! Study of Table 7.1 of Steinhurst's dissertation (2007): number of chips that a frame rate needs, by the
+//! table's symbols and by measured counts.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonMapSize;
@@ -34,7 +34,6 @@ struct Frame {
     /// tiles were all rendered.
     errors: Errors,
     map: PhotonMapSize,
-    /// Machine that renders the frame.
     machine: Machine,
 }
 
@@ -88,8 +87,7 @@ fn all_on(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on())
 }
 
-/// Point with all techniques and tiles of 16x16 pixels, which can be assigned to chips. Every tile is
-/// rendered.
+/// Point with all techniques and tiles of 16x16 pixels, enough for many chips. Every tile is rendered.
 fn dealt(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on_in_small_tiles())
 }
@@ -105,7 +103,7 @@ pub(super) fn symbols(scale: &Scale) -> Symbols {
     workload::symbols(&scale.settings(GatherOrder::Sort))
 }
 
-/// Frames with the table's own counts.
+/// Frames with the counts of Table 7.1: one naive, one with all techniques.
 fn table_frames(machine: Machine) -> [Frame; 2] {
     let nominal = Symbols::NOMINAL;
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
@@ -132,7 +130,7 @@ fn table_frames(machine: Machine) -> [Frame; 2] {
     ]
 }
 
-/// Frames with measured counts. The table's own frames precede them if the scale is the table's.
+/// Frames with measured counts. At the nominal scale, the frames of Table 7.1 precede them.
 fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
     let mut frames = Vec::new();
     if scale.is_nominal() {

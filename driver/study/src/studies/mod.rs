@@ -28,18 +28,20 @@ use photoncard_picture::choice::choices;
 /// A study that the program offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Study {
-    /// Memory traffic by order, cache and layout.
+    /// Memory traffic by order of the gathers, cache, and layout of the photon map.
     Reordering,
-    /// Memory traffic over the exponent of a glossy floor (figure 6.17 of the dissertation).
+    /// Memory traffic over the exponent of a glossy floor (figure 6.17 of Steinhurst's dissertation, 2007).
     Figure617,
-    /// Cost model of Table 7.1, with nominal and measured counts.
+    /// Number of chips for a frame rate, by the cost model of the dissertation's Table 7.1 with nominal and
+    /// with measured counts.
     Table71,
-    /// Each technique alone and all together, at equal numbers of rays and at equal quality.
+    /// Memory traffic of each technique alone and of all together, at equal numbers of rays and at equal
+    /// quality.
     Techniques,
     /// Memory traffic over the number of photons, the side of tiles and the size of the queue; time over the
     /// number of chips.
     Scaling,
-    /// Parts of a frame while the camera and lights move.
+    /// Time and bytes of each part of a frame's work while the camera and lights move.
     Interactive,
 }
 

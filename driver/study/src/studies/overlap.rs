@@ -21,7 +21,7 @@ const POLICIES: [&str; 3] =
 /// A line of the tables: order of the gathers, and layout of the photon map.
 type Line = (GatherOrder, PhotonLayout);
 
-/// The line whose queue is varied.
+/// Line for which the size of the queue is varied.
 const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 
 /// Sizes of the queue, in gathers, for which times are compared. Points are measured with each size and with

@@ -37,7 +37,6 @@ pub(super) fn gigabyte_point(x: f64, estimate: Estimate) -> Point {
     Point::with_half_width(x, estimate.value, estimate.half_width)
 }
 
-/// Columns with these names and units.
 pub(super) fn columns(heads: &[(&str, &str)]) -> Vec<Column> {
     heads.iter().map(|&(name, unit)| Column::new(name, unit)).collect()
 }
@@ -101,7 +100,7 @@ pub(super) fn how_it_counts() -> String {
         .to_owned()
 }
 
-/// File and name in reports of a simple, a glossy and a large scene.
+/// Scenes of the studies, a simple, a glossy and a large one: file, and name in reports.
 pub(super) const SCENES: [(&str, &str); 3] =
     [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), (ATRIUM, "atrium")];
 pub(super) const CORNELL: &str = "cornell.gltf";

@@ -1,4 +1,4 @@
-//! Study of the photon map's memory traffic by order, cache and layout.
+//! Study of the photon map's memory traffic by order of the gathers, cache, and layout of the map.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::memory::SetIndex;
@@ -19,7 +19,7 @@ use super::present::{
 };
 use super::times::{self, TimedFrame};
 
-/// Order of a row: that of a chip, or `None` for all gathers of the frame along one curve.
+/// Order of gathers in a table's row: that of a chip, or `None` for all gathers of the frame along one curve.
 type Order = Option<GatherOrder>;
 
 fn name(order: Order) -> &'static str {
@@ -35,8 +35,8 @@ const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Sort,
 ];
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
-/// Sides of tiles, pixels: the dissertation's, a larger one, and the largest for which the reference chip has
-/// room.
+/// Sides of tiles, pixels: the dissertation's, a larger one, and the largest that the reference chip can
+/// render.
 const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
 /// Published bytes per frame (Graphics Interface 2005): requested in the naive order, fetched from DRAM in
 /// the practical orders, and fetched from DRAM along a Hilbert curve.
@@ -51,7 +51,7 @@ fn sizes(scale: &Scale) -> Vec<u32> {
     scale.pick(&[32, 64, 128, 256, 512], &[32, 128, 512])
 }
 
-/// Photon caches with 1, 4 and 32 ways, and with 32 ways and hashed sets, with their names.
+/// Photon caches with 1, 4 and 32 ways, and with 32 ways and a hashed set index, with their names.
 fn associativities() -> [(String, CacheSettings); 4] {
     let of = |ways, index| behind(CacheSpec { ways, index, ..CacheSpec::PHOTON });
     [
@@ -133,7 +133,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     page("Reordering photon gathers", introduction, sections)
 }
 
-/// Table with a row for every order and layout, behind the nominal caches.
+/// Table with a row for every order and layout, measured with the nominal caches.
 fn by_order<'a>(
     title: &str,
     heads: &[(&str, &str)],
@@ -163,7 +163,7 @@ fn orders<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Tabl
     })
 }
 
-/// Table of sorted gathers by the side of a tile. Each tile reads about the whole map once.
+/// Table of the traffic of sorted gathers by the side of a tile. Each tile reads about the whole map once.
 fn by_tile<'a>(
     scale: &Scale,
     results: &Results,

@@ -1,4 +1,4 @@
-//! Time of one chip for a frame, with read latency.
+//! Time that one chip takes for a frame, with the latency of its memory reads.
 
 use photoncard_render::cost_model::arithmetic::ChipPart;
 use photoncard_render::cost_model::timing::{FrameLoad, FrameTimes, Load, Policy, Shares, TimedChip};
@@ -11,16 +11,16 @@ use super::super::point::Point;
 use super::super::report::Cell;
 use super::{arithmetic, workload};
 
-/// Numbers of tasks in flight that are compared with the machine's own.
+/// Numbers of tasks (rays or gathers) in flight that are compared with the machine's own number.
 const FEWER_TASKS: [u32; 2] = [1, 16];
 
-/// A measured frame on a machine.
+/// Work of a measured frame, and the machine for which times are computed.
 pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
-    /// Mean number of gathers that wait when a drain begins: the counted number or, if the order has no
-    /// queue, the capacity of the chip's queue. Gathers of such an order also wait for the gather unit, and
-    /// are done in the order of arrival.
+    /// Mean number of gathers in the queue when the chip begins to empty it. For an order of gathers without
+    /// a queue, it is the capacity of the chip's queue: the gathers are assumed to wait for the gather unit
+    /// there, in the order of arrival.
     drained: u64,
     has_queue: bool,
 }
@@ -66,8 +66,9 @@ impl TimedFrame {
         self.times(tasks, self.drained, Policy::Alternate)
     }
 
-    /// Times of a chip with separate arithmetic per unit, and a queue in two halves. If the order has a
-    /// queue, the frame must be measured with a queue of the size of one half.
+    /// Times of a chip whose units have separate arithmetic, in the proportions `shares`, and whose queue has
+    /// two halves: one is filled while the other is drained. If the order has a queue, the frame must be
+    /// measured with a queue of the size of one half.
     pub(super) fn overlapped(&self, shares: Shares) -> FrameTimes {
         let queue = if self.has_queue { 2 * self.drained } else { self.drained };
         self.times(self.machine.tasks, queue, Policy::Overlapped(shares))
@@ -111,8 +112,8 @@ fn tasks(machine: &Machine) -> Vec<u32> {
     FEWER_TASKS.into_iter().filter(|&fewer| fewer < machine.tasks).chain([machine.tasks]).collect()
 }
 
-/// Columns of [`cells`]: parts of the time with the machine's tasks in flight, the whole frame by number of
-/// tasks, and the bound of the frame.
+/// Names and units of the columns of [`cells`]: times of rays and of gathers with the machine's number of
+/// tasks in flight, time of the frame for each number of tasks, and lower bound of the frame's time.
 pub(super) fn heads(machine: &Machine) -> Vec<(String, &'static str)> {
     let parts = ["rays", "gathers"].map(|part| format!("{part}, {} in flight", machine.tasks));
     let frames = tasks(machine).into_iter().map(|tasks| format!("frame, {tasks} in flight"));

@@ -1,4 +1,4 @@
-//! Converts measured counts to workloads of the cost model.
+//! Converts measured counts to workloads of the cost model of Steinhurst's dissertation (2007), Table 7.1.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_render::RenderSettings;
@@ -13,7 +13,7 @@ type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 /// 7.1, because they do not depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
-    // Tiles have the size of those in Table 7.1, so that tile rates of frames in tiles of any size can be
+    // Tiles are counted as if they had the size of Table 7.1's, so that the tile rates of all frames can be
     // compared.
     of(&total, pixels / symbols.tile_pixels, pixels, symbols)
 }
@@ -32,7 +32,7 @@ pub(super) fn symbols(settings: &RenderSettings) -> Symbols {
     }
 }
 
-/// Symbols as in [`symbols`], where `N_PM` is the number of photons in the measured frame's map.
+/// Symbols as in [`symbols`], but with the number of photons in the measured frame's map as `N_PM`.
 pub(super) fn symbols_of(settings: &RenderSettings, measured: &Measurement) -> Symbols {
     Symbols { photons: measured.map.photons as f64, ..symbols(settings) }
 }

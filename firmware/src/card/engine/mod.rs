@@ -1,4 +1,4 @@
-//! The part of a card's state that commands change, and the work that commands start.
+//! Engine of a card: executes commands, and does the work that they start.
 
 #[cfg(test)]
 mod tests;
@@ -22,16 +22,16 @@ use crate::render::RenderJob;
 use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
 
-/// Maximum number of queued tile commands for all kinds of chips.
+/// Maximum number of queued tile commands of a card, whatever its kind of chip.
 pub const MAX_TILES: usize = 8;
 
-/// Image, frame and tiles of a card: the state that commands change.
+/// Engine of a card: its chip, and the card image, frame and tiles that commands set.
 pub(super) struct Engine<K: ChipKind> {
     chip: Chip<K>,
     image: ImageState,
-    /// Function that measures on-chip memory; `None` on a board without such a function.
+    /// Function that measures on-chip memory; `None` if the board has no such function.
     pub(super) measure: Option<fn() -> MemoryUse>,
-    /// Number of lines, from the first line, written since the card was switched on.
+    /// Number of leading lines of card memory that were written since the card was switched on.
     written: u32,
     checksums: Option<Checksums>,
     frame: Option<FrameParameters>,
@@ -39,13 +39,14 @@ pub(super) struct Engine<K: ChipKind> {
     tiles: Deque<Tile, MAX_TILES>,
     /// Number of tiles that the chip has begun and whose [`Reply::TileDone`] was not sent yet.
     begun: usize,
-    /// A tile whose pixels were sent, with its counters.
+    /// Tile whose pixels were sent but whose [`Reply::TileDone`] was not, with its counters.
     finished: Option<(u32, Counters)>,
     /// True if the host has announced that no tile follows for now.
     is_flushed: bool,
     /// True if tiles are in flight, but the chip can do nothing for them before the next command.
     waits: bool,
-    /// Tile of the pixels in `data`, and the row-major index in this tile of the first of these pixels.
+    /// Number of the tile whose pixels are in `data`, and row-major index of the first of these pixels in the
+    /// tile.
     first: (u32, u32),
     /// Data of the next reply: consecutive pixels of a tile, checksums, or results of a computation.
     data: heapless::Vec<u8, DATA_BYTES>,
@@ -74,7 +75,7 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
-    /// Executes a command. Returns its reply if it is ready at once.
+    /// Executes a command. Returns the reply; `None` if `work` sends it later or the command has none.
     ///
     /// # Errors
     /// The fault to be sent in place of a reply.
@@ -139,7 +140,7 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
-    /// Computes the self-test's results for triples of operands.
+    /// Computes the results of the arithmetic self-test for encoded triples of operands.
     fn compute(&mut self, operands: &[u8]) -> Result<Reply<'_>, Fault> {
         if self.is_at_work() {
             return Err(OUT_OF_ORDER);
@@ -150,8 +151,8 @@ impl<K: ChipKind> Engine<K> {
         }
         self.data.clear();
         for case in cases {
-            // Never full: the assertion above proves that the results of all cases fit. No test can show the
-            // fault.
+            // The buffer cannot be full here: the assertion on `DATA_BYTES` proves that the results of all
+            // cases fit. No test can show the fault.
             self.data.extend_from_slice(&compute_bytes(case)).map_err(|_| Invariant::Reply.fault())?;
         }
         Ok(Reply::Computed { results: &self.data })
@@ -171,7 +172,6 @@ impl<K: ChipKind> Engine<K> {
         self.drop_begun();
     }
 
-    /// Drops the tiles that the chip has begun.
     fn drop_begun(&mut self) {
         self.chip.clear();
         self.begun = 0;
@@ -191,7 +191,7 @@ impl<K: ChipKind> Engine<K> {
         self.has_tiles() || self.checksums.is_some()
     }
 
-    /// Returns true while there is work that needs no further command.
+    /// Returns true while `work` can proceed without a further command.
     pub(super) fn has_work(&self) -> bool {
         self.has_tiles() && !self.waits
             || self.checksums.is_some()
@@ -215,7 +215,8 @@ impl<K: ChipKind> Engine<K> {
         self.tiles.push_back(tile).map_err(|_| too_many)
     }
 
-    /// Does the next piece of work. If rendering fails, the tiles that the chip has begun are dropped.
+    /// Does the next piece of work: checksums, the check of a card image, a memory test, or rendering. If
+    /// rendering fails, the tiles that the chip has begun are dropped.
     ///
     /// # Errors
     /// The fault to be sent.
@@ -350,7 +351,6 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
-    /// Sends the collected pixels, if any.
     fn send_pixels(&mut self, transport: &mut Transport) {
         if !self.data.is_empty() {
             let (tile, first) = self.first;

@@ -2,17 +2,17 @@
 //!
 //! The translational gradient is a sum over the borders of neighbouring cells. Each term is the difference of
 //! the two cells' radiances times the speed at which the border moves over the hemisphere when the point
-//! moves, which is proportional to the inverse distance of the nearer cell. The gradient is therefore linear
-//! in the radiances, with coefficients that depend only on distances. The survey finds the distances before
-//! any photon is gathered, so that gathers can add their terms in any order.
+//! moves. This speed is proportional to the inverse distance in the nearer cell. The gradient is therefore
+//! linear in the radiances, with coefficients that depend only on distances. The survey finds the distances
+//! before any photon is gathered, so that gathers can add their terms in any order.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
 use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre};
 use crate::render::GatherPoint;
 
-/// Distance from a record to its surroundings in each cell, divided by the harmonic mean of the distances;
-/// logarithmic 8-bit codes.
+/// Distance from a record to its surroundings in each cell, divided by the harmonic mean of the distances.
+/// Stored as logarithmic 8-bit codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Distances([u8; CELLS]);
 
@@ -47,9 +47,9 @@ fn decode(code: u8) -> f32 {
     f32::from_bits(((code as u32 + ONE - MEAN_CODE) << SHIFT) | 1 << (SHIFT - 1))
 }
 
-/// Weight of a gather ray in the translational gradient, by cell, along tangent and bitangent. It is
-/// multiplied by the harmonic mean distance and thus dimensionless, so that sums do not depend on the scale
-/// of the scene.
+/// Weights of gather rays in the translational gradient, for each cell of the hemisphere, along tangent and
+/// bitangent. They are multiplied by the harmonic mean distance and thus dimensionless: sums do not depend on
+/// the scale of the scene.
 pub(super) type Coefficients = [[f32; 2]; CELLS];
 
 /// Weight of each hemisphere cell's rays in the translational gradient at a gather point, as if its surface
@@ -101,7 +101,7 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
     coefficients
 }
 
-/// Weight of a gather ray in the rotational gradient, by cell, along tangent and bitangent.
+/// Weight in the rotational gradient of a gather ray in cell `cell`, along tangent and bitangent.
 pub(super) fn rotation(cell: u8) -> [f32; 2] {
     let [azimuth, sine_squared] = cell_centre(cell);
     let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));

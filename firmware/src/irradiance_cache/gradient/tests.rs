@@ -12,7 +12,7 @@ fn white(position: Vec3, normal: Vec3) -> Surface {
     Surface::white(position, normal, magnitude(&[position]))
 }
 
-/// Hit on a ceiling at height 1 of a ray from `origin`: its distance, and a radiance that grows along x.
+/// Hit of a ray from `origin` on a ceiling at height 1: its distance, and a radiance that grows along x.
 fn ceiling(origin: Vec3, direction: Vec3) -> (f32, f32) {
     let distance = (1.0 - origin.y) / max(direction.y, 1e-3);
     let x = (origin + direction * distance).x;

@@ -1,27 +1,27 @@
-//! Several discrete choices in a row from one random number. Each choice rescales the number for the next.
+//! Successive discrete choices by a single random number. Each choice rescales the number for the next.
 
 use photoncard_shared::message::Fault;
 
 use crate::sampler::{hash, unit_interval};
 use crate::vector::{max, min};
 
-/// A random number in [0, 1) for several choices in a row.
+/// Random number in [0, 1) that makes several choices one after another.
 ///
-/// A choice of probability p leaves the number with -log2(p) bits fewer. Random bits from `dither` replace
-/// them, so that choices within a small share have full resolution.
+/// A choice of probability p uses up -log2(p) random bits of the number. Bits from `dither` replace them, so
+/// that later choices have full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fraction {
     value: f32,
     dither: u32,
 }
 
-/// Step of a random number before the first choice: 2^-24.
+/// Resolution of a random number before the first choice: 2^-24.
 const STEP: f32 = 1.0 / 16_777_216.0;
-/// Maximum value of a fraction.
+/// Maximum value of a `Fraction`.
 const BELOW_ONE: f32 = 1.0 - STEP;
 
 impl Fraction {
-    /// Creates a fraction from a value in [0, 1) and 32 random bits.
+    /// Creates a fraction from a random number `value` in [0, 1) and 32 further random bits.
     #[inline(always)]
     pub fn new(value: f32, dither: u32) -> Self {
         Self { value, dither }
@@ -33,7 +33,7 @@ impl Fraction {
         self.value
     }
 
-    /// Maps the interval `lower..lower + width`, which contains the value, to [0, 1).
+    /// Maps the interval `lower..lower + width` linearly to [0, 1). The interval must contain the value.
     #[inline(always)]
     #[must_use]
     pub fn within(self, lower: f32, width: f32) -> Self {
@@ -43,18 +43,18 @@ impl Fraction {
     }
 }
 
-/// Result of [`choose`]: index, probability, and rescaled fraction.
+/// Result of [`choose`]: the item's index and probability, and the rescaled fraction.
 pub(super) struct Chosen {
     pub(super) index: u32,
     pub(super) probability: f32,
     pub(super) rest: Fraction,
 }
 
-/// Number of units of a cumulative distribution function's thresholds in a probability of 1: 2^32.
+/// Value of a threshold that means a probability of 1: 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
-/// Chooses one of `count` items by a cumulative distribution function. `threshold` returns the function's
-/// value at an index, in units of 2^-32.
+/// Chooses one of `count` items by a cumulative distribution function. `threshold(i)` must return the
+/// function's value for item `i`, the sum of the probabilities of items 0 to `i`, in units of 2^-32.
 pub(super) fn choose(
     fraction: Fraction,
     count: u32,
@@ -84,8 +84,8 @@ pub(super) fn probability(
     share(index, &mut threshold).map(|(_, width)| width)
 }
 
-/// Lower end, in units of 2^-32, and width, 0 to 1, of item `index`'s interval in the cumulative distribution
-/// function.
+/// Interval of item `index` in the cumulative distribution function: its lower end, in units of 2^-32, and
+/// its width, 0 to 1.
 fn share(index: u32, threshold: &mut impl FnMut(u32) -> Result<u32, Fault>) -> Result<(u32, f32), Fault> {
     let lower = match index.checked_sub(1) {
         Some(before) => threshold(before)?,

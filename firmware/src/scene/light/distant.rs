@@ -12,8 +12,8 @@ use crate::scene::SceneImage;
 
 const LIGHTS_PER_LINE: u32 = DistantLight::PER_LINE as u32;
 
-/// Samples a distant light by the fraction `across`. `share` is the probability with which a light sample
-/// chooses a distant light.
+/// Chooses a distant light by the random number `across`. `share` is the probability with which the caller
+/// has chosen the distant lights among all lights.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

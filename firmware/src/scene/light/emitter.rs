@@ -1,5 +1,5 @@
-//! Sampling of emitters: triangles uniformly by area, and point and spot lights. The light tree selects the
-//! emitter.
+//! Sampling of emitters: emissive triangles, point lights and spot lights. The light tree selects an emitter;
+//! a point on a triangle is uniform by area.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -23,11 +23,11 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 pub struct EmitterPoint {
     /// Position, metres.
     pub position: Vec3,
-    /// Unit normal of the front.
+    /// Unit normal of the triangle's front side.
     pub normal: Vec3,
     /// Radiance that the point emits, W/(sr m^2).
     pub emission: Vec3,
-    /// Maximum magnitude of the triangle's coordinates, metres.
+    /// Greatest absolute coordinate of the triangle's corners, metres.
     pub magnitude: f32,
 }
 
@@ -41,8 +41,8 @@ pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Emitter::read(bytes))
 }
 
-/// Maps a point of the unit square to an emissive triangle, continuously and uniformly by area; `None` if the
-/// emitter is not a triangle.
+/// Maps a point of the unit square to a point on an emissive triangle. The map is continuous and preserves
+/// area ratios. Returns `None` if the emitter is not a triangle.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -72,8 +72,8 @@ pub fn emitter_point(
     }))
 }
 
-/// Radiance that a triangle with an emissive texture, cut-outs or partial coverage emits at the point with
-/// barycentric `weights`, W/(sr m^2).
+/// Radiance, W/(sr m^2), emitted by a triangle at the point with the barycentric coordinates `weights`. Takes
+/// emissive texture, cut-outs and partial coverage into account.
 fn emission_at(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -95,9 +95,9 @@ fn emission_at(
     Ok(emission * Vec3::new(red, green, blue))
 }
 
-/// Probability density, 1/sr, of a light sample in a direction that hits the emissive triangle `emitter` at
-/// `distance`, metres. `cosine` is that of the angle between the direction to the receiver and the triangle's
-/// normal.
+/// Probability density, 1/sr, with which `sample_light` returns the direction to a given point on the
+/// emissive triangle `emitter`. The point is at `distance`, metres, from the receiver. `cosine` is the cosine
+/// between the triangle's normal and the direction to the receiver.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -115,8 +115,8 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// Samples the emitters by the fractions `across` and `down`. `share` is the probability with which a light
-/// sample chooses an emitter.
+/// Selects an emitter and a point on it by the random numbers `across` and `down`. `share` is the probability
+/// with which the caller has chosen the emitters among all lights.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -147,16 +147,16 @@ pub(super) fn sample(
     }
 }
 
-/// Angular attenuation of a spot light, 0 to 1, at the cosine `cosine` of the angle to the light's axis
-/// (`KHR_lights_punctual`).
+/// Angular attenuation of a spot light, `clamp(cosine * scale + offset, 0, 1)^2` (`KHR_lights_punctual`).
+/// `cosine` is the cosine of the angle to the light's axis.
 #[inline(always)]
 pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
     let linear = min(max(cosine * scale + offset, 0.0), 1.0);
     linear * linear
 }
 
-/// Light sample from a point of a triangle that was chosen with the density `density`, 1/m^2; `None` if the
-/// receiver is on the side of the triangle that does not emit.
+/// Creates the light sample of a point on a triangle, chosen with the probability density `density`, 1/m^2.
+/// Returns `None` if the receiver is on the side of the triangle that does not emit.
 fn from_area(
     receiver: &Receiver,
     target: &EmitterPoint,
@@ -183,8 +183,8 @@ fn from_area(
     })
 }
 
-/// Light sample from a point or spot light that was chosen with the probability `probability`. `intensity`
-/// maps the direction towards the light to the light's intensity, W/sr; `None` at distance 0.
+/// Creates the light sample of a point or spot light, chosen with the probability `probability`. `intensity`
+/// maps the direction from receiver to light to the intensity, W/sr. Returns `None` at distance 0.
 fn from_point(
     receiver: &Receiver,
     position: Vec3,

@@ -1,7 +1,8 @@
-//! Environment light: infinitely distant light, given by an equirectangular map. Directions are sampled from
-//! a grid of cells of equal angles: first the row, then the column, in proportion to the light through the
-//! cell, then uniformly in solid angle within the cell. A cell whose light comes from a small part of it,
-//! such as the sun, is subdivided into parts of equal solid angle, which are chosen in the same way.
+//! Environment light: infinitely distant light, given by an equirectangular map. To sample a direction, the
+//! map is divided into a grid of cells of equal angles. A row and then a column are chosen in proportion to
+//! their light; the direction is uniform in solid angle within the cell. A cell with an uneven distribution
+//! of light, for example with the sun, is subdivided into parts of equal solid angle, which are chosen in the
+//! same way.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -15,16 +16,16 @@ use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};
 
-/// Coordinates of a direction on the equirectangular map, from the left and from the top, 0 to 1. The centre
-/// of the map is the direction -z, the top +y.
+/// Coordinates of a direction on the equirectangular map, `[from the left, from the top]`, each 0 to 1. The
+/// centre of the map is the direction -z; its top is +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
     [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
 }
 
-/// Unit vector at the horizontal coordinate `across` of the map, 0 to 1 from the left, and at the cosine
-/// `cosine` of the angle to +y.
+/// Unit vector at a position of the equirectangular map: `across` is the horizontal coordinate, 0 to 1 from
+/// the left, and `cosine` is the cosine of the angle to +y.
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
@@ -32,7 +33,7 @@ pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     Vec3::new(sine * x, cosine, -sine * z)
 }
 
-/// Radiance of the environment from a direction, W/(sr m^2); zero without an environment.
+/// Radiance of the environment in a direction from the scene, W/(sr m^2); zero without an environment.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -47,7 +48,7 @@ pub fn environment_radiance(
     Ok(Vec3::new(red, green, blue) * Vec3::from_array(scene.header.lights.radiance))
 }
 
-/// Probability density of a light sample in a direction of the environment, 1/sr.
+/// Probability density, 1/sr, with which `sample_light` returns a direction of the environment.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -73,8 +74,8 @@ pub fn environment_density(
     Ok(density * parts.density(scene, memory, place)?)
 }
 
-/// Samples a direction of the environment. `share` is the probability with which a light sample chooses the
-/// environment.
+/// Samples a direction of the environment. `share` is the probability with which the caller has chosen the
+/// environment among all lights.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -103,12 +104,13 @@ pub(super) fn sample(
     })
 }
 
-/// Index of the one of `cells` equal intervals of [0, 1] that contains a coordinate.
+/// Index of the interval that contains a coordinate, where [0, 1] is divided into `cells` equal intervals.
 fn cell_at(coordinate: f32, cells: u32) -> u32 {
     ((coordinate * cells as f32) as u32).min(cells - 1)
 }
 
-/// Grid of cells, with the indices of the cells' thresholds in [`SectionKind::EnvironmentCells`].
+/// Grid of cells from which directions are sampled. The cumulative distribution functions of its rows and
+/// cells are tables of thresholds in [`SectionKind::EnvironmentCells`].
 struct Cells {
     columns: u32,
     rows: u32,
@@ -120,20 +122,20 @@ impl Cells {
         Self { columns, rows }
     }
 
-    /// Index of the first threshold of the cells in a row.
+    /// Index, in the section, of the first threshold of row `row`'s cells.
     fn first_of_row(&self, row: u32) -> u32 {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
 
-    /// Cosine of the angle to +y of the directions above which the fraction `share` of a row's solid angle
-    /// lies.
+    /// Cosine of the angle to +y at the parallel that divides a row such that the fraction `share` of its
+    /// solid angle lies above.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
     }
 
-    /// Fraction of a row's solid angle above directions with the cosine `cosine` to +y: the inverse of
+    /// Fraction of a row's solid angle that lies above the cosine `cosine` to +y: the inverse of
     /// [`Self::cosine`].
     fn share(&self, row: u32, cosine: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
@@ -141,8 +143,8 @@ impl Cells {
         (upper - cosine) / (upper - lower)
     }
 
-    /// Density, 1/sr, of a direction in a cell of row `row`, if the environment is chosen with the
-    /// probability `share` and the cell then with the probability `probability`.
+    /// Density, 1/sr, of a sampled direction in a cell of row `row`. The environment is chosen with the
+    /// probability `share`, and then the cell with the probability `probability`.
     fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
         // The difference cos(upper border) - cos(lower border) is computed as a product, to avoid
         // cancellation.
@@ -153,17 +155,18 @@ impl Cells {
     }
 }
 
-/// Parts of a subdivided cell: `side` rows of `side` parts, all of equal solid angle.
+/// Parts of a subdivided cell: a grid of `side` by `side` parts of equal solid angle.
 struct Parts {
-    /// Index of the first threshold: the thresholds of the rows, then of the parts in each row.
+    /// Index, in the section, of the first threshold of the cell's parts. The thresholds of the rows come
+    /// first, then those of the parts in each row.
     first: u32,
     side: u32,
 }
 
 impl Parts {
-    /// Reads the parts of a cell; `None` if the cell is not subdivided. After the thresholds of all cells
-    /// come the number of subdivided cells, the number of rows of each, and the cells' numbers in increasing
-    /// order.
+    /// Looks up the parts of a cell; returns `None` if the cell is not subdivided. The section holds, after
+    /// the thresholds of all cells, the number of subdivided cells, the value of `side`, and the sorted
+    /// numbers of the subdivided cells.
     fn of(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -192,13 +195,13 @@ impl Parts {
         Ok(None)
     }
 
-    /// Index of the first threshold of the parts in a row.
+    /// Index, in the section, of the first threshold of row `row`'s parts.
     fn first_of_row(&self, row: u32) -> u32 {
         self.first.wrapping_add(self.side.wrapping_mul(row.wrapping_add(1)))
     }
 
-    /// Samples a position in the cell. Returns its coordinates, 0 to 1 downwards and 0 to 1 across, and its
-    /// density relative to that of a uniform choice.
+    /// Samples a position in the cell. Returns its coordinates `[down, across]`, each 0 to 1, and its
+    /// probability density divided by that of a uniform position.
     fn sample(
         &self,
         scene: &SceneImage,
@@ -214,7 +217,7 @@ impl Parts {
         Ok((place, row.probability * column.probability * (side * side)))
     }
 
-    /// Density of [`Self::sample`] at a position in the cell, relative to that of a uniform choice.
+    /// Density of [`Self::sample`] at a position in the cell, divided by that of a uniform position.
     fn density(
         &self,
         scene: &SceneImage,

@@ -1,13 +1,13 @@
-//! Light sampling for shadow rays: choice of a light and of a point on it, with the probability density.
+//! Light sampling for shadow rays: choice of a light and of a point on it, and the probability density.
 //!
-//! Emissive triangles, point lights and spot lights are leaves of the light tree (module `tree`). Distant
-//! lights and the environment are infinitely far and not in the tree; the header of the card image has the
-//! probabilities of the three kinds. One point of the unit square makes all choices: each choice uses a part
-//! of a coordinate and rescales the remainder ([`Fraction`]). Neighbouring points therefore map to
-//! neighbouring points of one light, and a stratified pattern stratifies the lights.
+//! There are three kinds of lights: emitters (emissive triangles, point lights and spot lights), which are
+//! leaves of the light tree (module `tree`); distant lights; and the environment. The card image's header
+//! holds the probability of each kind. One point of the unit square makes all choices: each choice rescales a
+//! coordinate within the chosen interval to [0, 1) for the next choice ([`Fraction`]). Neighbouring points of
+//! the square therefore map to neighbouring points of one light. A stratified pattern stratifies the lights.
 //!
-//! Sampling and density use equal operations. The weights of a shadow ray and of a gather ray that hits the
-//! light therefore differ only by the rounding of the gather ray's hit.
+//! Sampling and evaluation of the density use the same floating-point operations. The density of a gather ray
+//! that hits a light therefore differs from that of a shadow ray only by the rounding of the hit point.
 
 mod choice;
 mod distant;
@@ -30,8 +30,9 @@ use photoncard_shared::message::Fault;
 use super::SceneImage;
 use crate::memory::MemoryPort;
 
-/// Samples a light for the receiver of `choices` by a point `(u, v)` of the unit square and 32 random bits;
-/// `None` if the chosen light does not reach the receiver, or there is no light.
+/// Samples the light that arrives at the receiver of `choices`, by the point `(u, v)` of the unit square and
+/// the 32 random bits `dither`. Returns `None` if the chosen light does not shine on the receiver, or the
+/// scene has no light. Occlusion is not tested.
 ///
 /// # Errors
 /// If the card image is invalid.

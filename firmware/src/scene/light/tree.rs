@@ -2,13 +2,14 @@
 //! many lights with adaptive tree splitting*; bounds as in Pharr, Jakob, Humphreys 2023, *Physically Based
 //! Rendering*, section 12.6.3).
 //!
-//! At each node one of up to four children is chosen by an estimate of its light: power times the cosines at
-//! receiver and emitter, divided by the squared distance to the centre of the child's bounding sphere, which
-//! is at least the squared radius. Each cosine is a weighted mean of the cosine at the centre and the
-//! greatest cosine that the sphere and the cone of normals allow. The papers use the greatest cosine only; a
-//! large lamp or a sky attains this cosine at few points, and would take rays from emitters that contribute
-//! more. A fraction [`EVEN`] of the choices is uniform, so that emitters with a low estimate are still
-//! sampled. A child whose greatest cosine is negative cannot light the receiver and is excluded.
+//! At each node, one of up to four children is chosen with a probability proportional to an estimate of its
+//! light at the receiver. The estimate is power times the cosines at receiver and emitter, divided by
+//! `max(d^2, r^2)`, where `r` is the radius of the child's bounding sphere and `d` is the distance to its
+//! centre. Each cosine is a weighted mean of the cosine at the centre and of the greatest cosine that the
+//! sphere and the cone of normals allow. The papers use the greatest cosine alone. A large lamp reaches this
+//! cosine at few points, and would take rays from emitters that contribute more. A fraction [`EVEN`] of the
+//! choices is uniform, so that emitters with a low estimate are still sampled. A child whose greatest cosine
+//! is negative cannot light the receiver and is excluded.
 
 use glam::Vec3;
 use photoncard_shared::address::LINE_BYTES;
@@ -28,16 +29,16 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 const TRAIL_BITS: usize = 2;
 const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TREE_LEVELS <= 32);
 
-/// Fraction of the choices at a node that are uniform among the children not excluded.
+/// Probability with which the choice at a node is uniform among the children that are not excluded.
 const EVEN: f32 = 1.0 / 64.0;
-/// Weight of the greatest cosine in [`mean_cosine`] for a child that is an emitter, whose light comes from
-/// all of its surface. This value gives the least noise in the scenes `atrium` and `room`.
+/// Weight of the greatest cosine in [`mean_cosine`] for a child that is a single emitter. This value gives
+/// the least noise in the scenes `atrium` and `room`.
 const EMITTER_BOUND: f32 = 1.0 / 8.0;
-/// Weight of the greatest cosine in [`mean_cosine`] for a child that is a node, in which the nearest emitters
-/// can be anywhere. This value gives the least noise with 10,000 emitters.
+/// Weight of the greatest cosine in [`mean_cosine`] for a child that is a node, whose emitters can be
+/// anywhere in its bounding sphere. This value gives the least noise with 10,000 emitters.
 const NODE_BOUND: f32 = 1.0 / 2.0;
-/// Limit of the greatest cosine, below which a child is excluded: below 0 by more than the rounding error of
-/// cone axes.
+/// Greatest cosine below which a child is excluded. It is less than 0 by more than the rounding error of the
+/// cones' axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
 /// Result of [`select_emitter`].
@@ -45,13 +46,13 @@ const BELOW_HORIZON: f32 = -1e-3;
 pub struct Selection {
     /// Index of the emitter.
     pub emitter: u32,
-    /// Probability of the choice.
+    /// Probability with which the emitter was selected.
     pub probability: f32,
-    /// Fraction rescaled after the choice, to choose the point on the emitter.
+    /// Random number, rescaled after the selection, for the choice of a point on the emitter.
     pub rest: Fraction,
 }
 
-/// Selects an emitter for a receiver; `None` if no emitter can light the receiver.
+/// Selects an emitter for the receiver of `choices`; `None` if no emitter can light the receiver.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -120,15 +121,15 @@ fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Re
 
 /// Node number that no tree contains.
 const NO_NODE: u32 = u32::MAX;
-/// Number of nodes whose choices are cached.
+/// Number of nodes whose `Choice`s are cached.
 const KEPT_CHOICES: usize = 4;
 
-/// A receiver, with cached choices at the nodes read last. Most shadow rays of a point pass the same few
-/// nodes.
+/// A receiver, with a cache of the child probabilities (`Choice`) of a few nodes of the light tree. Most
+/// shadow rays of a point use the same nodes.
 pub struct LightChoices {
     pub(super) receiver: Receiver,
-    /// Cached choices, each with the number of its node. The index of a node's choice in the array is the
-    /// node's number modulo the array's length.
+    /// Cached choices, each with the number of its node. Node `i` is stored at index `i` modulo
+    /// `KEPT_CHOICES`.
     kept: [(u32, Choice); KEPT_CHOICES],
 }
 
@@ -138,7 +139,7 @@ impl LightChoices {
         Self { receiver, kept: [(NO_NODE, Choice::NONE); KEPT_CHOICES] }
     }
 
-    /// Choice at a node. The node is read if its choice is not cached.
+    /// Returns the choice at a node, from the cache if possible; otherwise the node is read.
     fn at(&mut self, scene: &SceneImage, memory: &mut impl MemoryPort, node: u32) -> Result<&Choice, Fault> {
         let [first, second, third, fourth] = &mut self.kept;
         let kept = match node as usize % KEPT_CHOICES {
@@ -154,13 +155,13 @@ impl LightChoices {
     }
 }
 
-/// Children of a node that can light a receiver, with their probabilities.
+/// Children of a node with their probabilities; `None` for those that cannot light the receiver.
 #[derive(Clone, Copy)]
 struct Choice {
     options: [Option<Weighted>; LIGHT_CHILDREN],
 }
 
-/// A child and the probability of its choice.
+/// Child of a node, and the probability with which it is chosen.
 #[derive(Clone, Copy)]
 struct Weighted {
     link: LightLink,
@@ -203,8 +204,8 @@ impl Choice {
         self.options.get(index).copied().flatten()
     }
 
-    /// Returns the child that a fraction chooses, and the lower end of the child's interval of fractions;
-    /// `None` if no child can light the receiver.
+    /// Returns the child chosen by the random number `fraction`, and the lower end of the child's interval in
+    /// [0, 1); `None` if no child can light the receiver.
     fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
         let mut chosen = None;
         let mut lower = 0.0;
@@ -219,17 +220,17 @@ impl Choice {
     }
 }
 
-/// Estimate of the light of a child at a receiver.
+/// Estimate of the light from a child that arrives at a receiver: `strength / distance_squared`.
 #[derive(Clone, Copy)]
 struct Estimate {
     /// Power times the cosines at receiver and emitter.
     strength: f32,
-    /// Squared distance to the sphere's centre, at least the squared radius, m^2.
+    /// `max(d^2, r^2)`, m^2, for the child's bounding sphere (see the module).
     distance_squared: f32,
 }
 
 impl Estimate {
-    /// Estimates the light of a child; `None` if the child cannot light the receiver.
+    /// Computes the estimate; `None` if the child cannot light the receiver.
     fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
         let way = Vec3::from_array(child.centre) - receiver.position;
         let towards = unit(way);
@@ -266,7 +267,7 @@ impl Estimate {
     }
 }
 
-/// Weighted mean of the cosine at a child's centre and of the greatest cosine, which has the weight `bound`.
+/// `(1 - bound) centre + bound greatest`, where negative cosines count as 0.
 fn mean_cosine(centre: f32, greatest: f32, bound: f32) -> f32 {
     (1.0 - bound) * max(centre, 0.0) + bound * max(greatest, 0.0)
 }

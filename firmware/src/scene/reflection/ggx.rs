@@ -1,16 +1,17 @@
-//! Microfacet lobe of glTF's metallic-roughness model, `f = D V F`: isotropic, single scattering. It follows
-//! glTF 2.0, appendix B.3, except for the masking.
+//! Microfacet lobe of glTF's metallic-roughness model, `f = D V F`: isotropic, with single scattering. It
+//! follows glTF 2.0, appendix B.3, except that the masking is height-correlated.
 //!
-//! `n` is the normal, `o` and `i` are the directions, `h` is their half vector, and `a = roughness^2`:
+//! `n` is the normal, `o` and `i` the outgoing and incident direction, `h` their half vector,
+//! `a = roughness^2`:
 //!
 //! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007; Trowbridge, Reitz 1975);
 //! - `V = 1 / (2 (n.i) L(n.o) + 2 (n.o) L(n.i))`, `L(c) = sqrt(a^2 + (1 - a^2) c^2)`: height-correlated Smith
 //!   masking (Heitz 2014);
 //! - `F = F0 + (F90 - F0) (1 - h.o)^5` (Schlick 1994).
 //!
-//! A mixture of metal and dielectric with one roughness is one lobe, because `F` is linear in `F0` and `F90`.
-//! Directions are sampled by visible normals (Heitz 2018) with spherical caps (Dupuy, Benyoub 2023). Their
-//! density is `p = D / (2 (n.o + L(n.o)))`, so that `f cos / p` is at most `F`.
+//! A mixture of metal and dielectric of the same roughness is a single lobe, because `F` is linear in `F0`
+//! and `F90`. Directions are sampled by visible normals (Heitz 2018) with spherical caps (Dupuy, Benyoub
+//! 2023). Their density is `p = D / (2 (n.o + L(n.o)))`; the weight `f cos / p` is at most `F`.
 
 use core::f32::consts::PI;
 
@@ -19,13 +20,13 @@ use glam::Vec3;
 use super::ggx_albedo::albedo_shares;
 use crate::vector::{about, max, max_component, min, mirror, unit};
 
-/// Minimum of `a`: a lobe 0.06 degrees wide, in which `f32` still resolves the half vector.
+/// Minimum of `a`. The lobe is then 0.06 degrees wide, and `f32` still resolves the half vector within it.
 pub(super) const MIN_ALPHA: f32 = 1e-3;
 
-/// Minimum of `a` for [`GgxLobe::gathers_caustics`], at which half of the light is within 3.4 degrees.
+/// Minimum of `a` for [`GgxLobe::gathers_caustics`]. Half of such a lobe's light is within 3.4 degrees.
 const MIN_CAUSTIC_ALPHA: f32 = 0.03;
 
-/// Minimum albedo that energy compensation divides by.
+/// Lower limit of the albedo by which energy compensation divides.
 const MIN_ALBEDO: f32 = 0.1;
 
 /// A GGX lobe for one outgoing direction.
@@ -54,16 +55,15 @@ pub(super) enum Estimate {
     /// A ray follows the lobe. Caustic photons of lights without an area are stored and gathered for the
     /// lobe.
     Ray,
-    /// As [`Self::Ray`], but no photons are stored for the lobe: the gathered photons are those stored for
-    /// the Lambertian part beside the lobe.
+    /// Like [`Self::Ray`], but no caustic photons are stored for the lobe. Those stored for the Lambertian
+    /// part of the same surface are gathered.
     RayBesideBase,
-    /// A ray follows the lobe, which takes no light from photons: the lobe of a coat or of rough
-    /// transmission.
+    /// A ray follows the lobe, and no photons are gathered for it. Lobes of coats and of rough transmission
+    /// use this method.
     RayAlone,
 }
 
-/// Quantities of normal and directions that a lobe depends on; `incident` and `outgoing` are the cosines
-/// `n.i` and `n.o`.
+/// Cosines and squared sine on which the lobe depends. `incident` is `n.i`; `outgoing` is `n.o`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Geometry {
     pub(super) incident: f32,
@@ -90,7 +90,7 @@ impl Geometry {
 }
 
 impl GgxLobe {
-    /// Creates the lobe for a roughness, 0 to 1, and an outgoing direction at `cosine` to the normal.
+    /// Creates a lobe with `roughness`, 0 to 1. `cosine` is the cosine between outgoing direction and normal.
     pub(super) fn new(f0: Vec3, f90: Vec3, roughness: f32, cosine: f32) -> Self {
         let shares = albedo_shares(roughness, cosine);
         let [of_f0, of_f90] = shares;
@@ -110,16 +110,16 @@ impl GgxLobe {
         Self { estimate: Estimate::RayAlone, ..self }
     }
 
-    /// Adds the light scattered several times between microfacets: `f (1 + F0 (1 - E) / E)`, where `E` is the
-    /// albedo of a lobe with `F = 1` (Turquin 2019, *Practical multiple scattering compensation for
-    /// microfacet models*).
+    /// Compensates for the missing multiple scattering between microfacets: multiplies `f` by
+    /// `1 + F0 (1 - E) / E`, where `E` is the albedo of a lobe with `F = 1` (Turquin 2019, *Practical
+    /// multiple scattering compensation for microfacet models*).
     pub(super) fn compensated(self) -> Self {
         let [of_f0, of_f90] = self.shares;
         let of_white = min(max(of_f0 + of_f90, MIN_ALBEDO), 1.0);
         self.dimmed(Vec3::ONE + self.f0 * ((1.0 - of_white) / of_white))
     }
 
-    /// Maximum channel of the albedo that the lobe would have with the reflectances `f0` and `f90`, 0 to 1.
+    /// Maximum channel, 0 to 1, of the albedo of a lobe that differs from this one by its `f0` and `f90`.
     pub(super) fn albedo_of(&self, f0: Vec3, f90: f32) -> f32 {
         let [of_f0, of_f90] = self.shares;
         min(max_component(f0) * of_f0 + f90 * of_f90, 1.0)
@@ -131,9 +131,9 @@ impl GgxLobe {
         Self { f0: self.f0 * colour, f90: self.f90 * colour, albedo: self.albedo * colour, ..self }
     }
 
-    /// Returns true if the lobe takes light from the caustic map: from photons of lights without an area. The
-    /// lobe must be wider than the rounding error of photon directions, and wider than a photon's disc
-    /// appears when it is seen from the object that the lobe reflects.
+    /// Returns true if caustic photons of lights without an area are gathered for the lobe. The lobe must be
+    /// wider than the rounding error of photon directions, and than the angle of a photon's disc seen from
+    /// the object that the lobe reflects.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
@@ -169,7 +169,7 @@ impl GgxLobe {
         self.fresnel(geometry) * (visible * incident)
     }
 
-    /// Ratio `f / p` divided by the albedo, dimensionless.
+    /// Ratio `f / (albedo p)`, by maximum channel, dimensionless.
     #[inline(always)]
     pub(super) fn gain(&self, geometry: &Geometry) -> f32 {
         let Geometry { outgoing, .. } = *geometry;
@@ -178,9 +178,9 @@ impl GgxLobe {
         max_component(self.fresnel(geometry)) * visible / albedo
     }
 
-    /// Colour by which a [`Kernel`](super::ggx_kernel::Kernel) is multiplied: the lobe's albedo divided by
-    /// that of a lobe with `F = 1`. It is the mean of `F` over all directions, so that the reflection of
-    /// uniform light is exact.
+    /// Colour by which a [`Kernel`](super::ggx_kernel::Kernel) is multiplied in place of `F`: the lobe's
+    /// albedo divided by that of a lobe with `F = 1`. Being the mean of `F`, it makes the reflection of
+    /// uniform light exact.
     pub(super) fn colour(&self) -> Vec3 {
         let [of_f0, of_f90] = self.shares;
         self.albedo * (1.0 / max(of_f0 + of_f90, f32::MIN_POSITIVE))
@@ -193,7 +193,7 @@ impl GgxLobe {
         self.f0 + (self.f90 - self.f0) * (squared * squared * rest)
     }
 
-    /// Maps a point of the unit square to a direction with density `p`, which can lie below the surface.
+    /// Maps a point of the unit square to a direction with density `p`, possibly below the surface.
     #[inline(always)]
     pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, point: [f32; 2]) -> Vec3 {
         mirror(outgoing, visible_normal(normal, outgoing, self.alpha, point))
@@ -206,7 +206,7 @@ impl GgxLobe {
     }
 }
 
-/// Maps a point of the unit square to the normal of a microfacet, with the density of visible normals.
+/// Maps a point of the unit square to a microfacet normal, with the distribution of visible normals.
 #[inline(always)]
 fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
     let height = normal.dot(outgoing);
@@ -221,13 +221,12 @@ fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) ->
     unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
 }
 
-/// Maps a point of the unit square to the normal of a microfacet at a roughness, with the density of visible
-/// normals.
+/// Does `visible_normal` for `a = roughness^2`, at least `MIN_ALPHA`.
 pub(super) fn microfacet(normal: Vec3, outgoing: Vec3, roughness: f32, point: [f32; 2]) -> Vec3 {
     visible_normal(normal, outgoing, max(roughness * roughness, MIN_ALPHA), point)
 }
 
-/// Smith masking `G1` at a cosine to the normal, 0 to 1.
+/// Smith masking `G1`, 0 to 1. `cosine` is the cosine between a direction and the normal.
 pub(super) fn masking(roughness: f32, cosine: f32) -> f32 {
     let (alpha, cosine) = (max(roughness * roughness, MIN_ALPHA), max(cosine, 0.0));
     2.0 * cosine / max(cosine + length(alpha, cosine), f32::MIN_POSITIVE)
@@ -245,7 +244,7 @@ pub(super) fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
 /// Minimum of the denominator of `V`, so that `D V` stays finite.
 const MIN_VISIBILITY_SUM: f32 = 1e-12;
 
-/// Visibility `V` of the module's formula, dimensionless.
+/// Visibility `V` (see the module), dimensionless.
 #[inline(always)]
 pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     let Geometry { incident, outgoing, .. } = *geometry;
@@ -253,7 +252,7 @@ pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     0.5 / max(sum, MIN_VISIBILITY_SUM)
 }
 
-/// `L(c) = sqrt(a^2 + (1 - a^2) c^2)` of the masking, at the cosine `c`.
+/// `L(c) = sqrt(a^2 + (1 - a^2) c^2)`, a term of the masking, where `c` is `cosine`.
 #[inline(always)]
 fn length(alpha: f32, cosine: f32) -> f32 {
     let squared = alpha * alpha;

@@ -1,21 +1,21 @@
-//! Directional albedo of the GGX lobe, `E = F0 A + F90 B`. `A` and `B` are in tables over roughness and
-//! cosine.
+//! Directional albedo of the GGX lobe: `E = F0 A + F90 B`. `A` and `B` are tabulated as functions of
+//! roughness and cosine.
 //!
-//! `A` is the integral of `f cos` for a lobe with `F = 1 - s`, `B` for a lobe with `F = s`, where `s = (1 -
-//! h.o)^5` is Schlick's factor. The entries were computed by quasi-Monte Carlo with 2^17 directions from
-//! visible normals. Interpolation between the entries is accurate to 0.004 for cosines above 0.2, to 0.02
-//! below.
+//! `A` is the integral of `f cos` for a lobe with `F = 1 - s`, and `B` for one with `F = s`, where
+//! `s = (1 - h.o)^5` is Schlick's factor. The entries were computed by quasi-Monte Carlo integration with
+//! 2^17 directions sampled by visible normals. The error of interpolated values is at most 0.004 for cosines
+//! above 0.2, and 0.02 below.
 
-/// Number of entries on each axis: roughness 0 to 1, and square root of the cosine 0 to 1.
+/// Number of rows (roughness 0 to 1) and of columns (square root of the cosine, 0 to 1) of a table.
 pub(super) const SIDE: usize = 16;
 
-/// Coefficients `[A, B]` for a roughness and the cosine between normal and outgoing direction, both 0 to 1.
+/// Coefficients `[A, B]` for a roughness, 0 to 1, and the cosine between normal and outgoing direction.
 #[inline(never)]
 pub(super) fn albedo_shares(roughness: f32, cosine: f32) -> [f32; 2] {
     [&F0_SHARES, &F90_SHARES].map(|table| interpolated(table, roughness, cosine))
 }
 
-/// Interpolates a table over roughness and square root of the cosine, whose entries are in steps of 1/255.
+/// Interpolates bilinearly in a table of values in units of 1/255.
 #[inline(always)]
 pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f32) -> f32 {
     let (row, down) = cell(roughness);
@@ -27,8 +27,8 @@ pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f
     (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
 }
 
-/// Index of the table entry at or before a coordinate in [0, 1], and the coordinate's fraction of the step to
-/// the next entry, 0 to 1. NaN counts as 0.
+/// Converts a coordinate in [0, 1] to the index of the last table entry that is not after it, and to the
+/// interpolation weight of the next entry, 0 to 1. NaN counts as 0.
 #[inline(always)]
 fn cell(coordinate: f32) -> (usize, f32) {
     let scaled = if coordinate > 0.0 { coordinate } else { 0.0 } * (SIDE - 1) as f32;
@@ -37,7 +37,7 @@ fn cell(coordinate: f32) -> (usize, f32) {
     (index, if rest < 1.0 { rest } else { 1.0 })
 }
 
-/// Table of `A`, in steps of 1/255.
+/// Table of `A`, in units of 1/255.
 const F0_SHARES: [[u8; SIDE]; SIDE] = [
     [0, 6, 22, 47, 79, 113, 148, 180, 207, 228, 242, 250, 253, 255, 255, 255],
     [22, 16, 25, 49, 79, 114, 149, 180, 207, 228, 241, 250, 253, 255, 255, 255],
@@ -57,7 +57,7 @@ const F0_SHARES: [[u8; SIDE]; SIDE] = [
     [243, 237, 226, 213, 199, 184, 170, 156, 143, 131, 120, 110, 101, 93, 85, 78],
 ];
 
-/// Table of `B`, in steps of 1/255.
+/// Table of `B`, in units of 1/255.
 const F90_SHARES: [[u8; SIDE]; SIDE] = [
     [255, 249, 233, 208, 176, 142, 107, 75, 48, 27, 13, 5, 2, 0, 0, 0],
     [231, 211, 221, 205, 175, 141, 106, 75, 48, 27, 14, 5, 2, 0, 0, 0],

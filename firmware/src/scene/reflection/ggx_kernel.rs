@@ -1,4 +1,4 @@
-//! GGX lobe of a waiting gather, evaluated as a factor of each photon's power.
+//! GGX lobe in the form in which a gather evaluates it: a factor for the power of each photon.
 
 use core::f32::consts::PI;
 
@@ -7,8 +7,8 @@ use glam::Vec3;
 use super::ggx::{Geometry, MIN_ALPHA, distribution, visibility};
 use crate::vector::max;
 
-/// Factor of photon power for a lobe with `F = 1`, seen from one direction: `D V` divided by its bound
-/// `1 / (2 pi a^3 n.o)`, so that sums of factors are bounded by sums of powers.
+/// GGX lobe with `F = 1` for one outgoing direction, scaled to 0 to 1: `D V` divided by its upper bound
+/// `1 / (2 pi a^3 n.o)`. Sums of powers times this factor do not exceed sums of powers.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     normal: Vec3,
@@ -16,7 +16,7 @@ pub struct Kernel {
     alpha: f32,
 }
 
-/// Minimum of `n.o` in a kernel, so that the bound of `D V` stays finite.
+/// Minimum of `n.o` in a kernel, which keeps the bound of `D V` finite.
 const MIN_KERNEL_COSINE: f32 = 0.02;
 
 impl Kernel {
@@ -35,7 +35,7 @@ impl Kernel {
         1.0 / (2.0 * PI * self.alpha * self.alpha * self.alpha * self.cosine())
     }
 
-    /// `D V` divided by the bound, 0 to 1, for a unit vector to the light; 0 below the surface.
+    /// `D V` divided by the bound, 0 to 1, for light from the unit vector `incident`; 0 below the surface.
     #[inline(always)]
     pub(super) fn factor(&self, incident: Vec3) -> f32 {
         let mut geometry = Geometry::new(self.normal, self.outgoing, incident);

@@ -1,11 +1,10 @@
-//! Surfaces of several layers: coat, sheen, base, and the reflection of the far side, which is seen through
-//! the surface by diffuse or rough transmission.
+//! Materials of several layers: coat, sheen, base, and the far side, whose reflection is seen through the
+//! surface by diffuse or rough transmission.
 //!
-//! A path takes one layer at random, in proportion to its share of the light; the reflection of that layer is
-//! divided by the probability. The samples of a pixel cover all layers. A surface therefore needs only one
-//! lobe, in registers and in the record of a waiting gather, whatever its layers. Light that reaches a layer
-//! is attenuated by the directional albedo of the layers above it. Rays follow coat, sheen and transmission;
-//! photons light only the base.
+//! A path chooses one layer at random, in proportion to the layers' albedos. The layer's reflection is
+//! divided by the probability of the choice. A surface thus needs only one lobe, in registers and in the
+//! gather queue. Light that reaches a layer is attenuated by the directional albedo of the layers above it.
+//! Rays follow coat, sheen and transmission; photons are gathered for the base alone.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
@@ -19,13 +18,13 @@ use super::sheen::SheenLobe;
 use crate::scene::specular::{Bounds, Glass, Specular};
 use crate::vector::{max, max_component};
 
-/// Minimum probability of a layer that reflects light. It bounds the weight of a sample.
+/// Lower limit of a layer's share in the sum of albedos. It bounds the weight of a sample.
 const MIN_PROBABILITY: f32 = 1.0 / 8.0;
 
 /// F0 of a coat, whose index of refraction is 1.5.
 const COAT_F0: f32 = 0.04;
 
-/// Factors of [`Layers`] at a point, from textures.
+/// Texture values at a point, by which the factors in [`Layers`] are multiplied.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct LayerTexel {
     pub(in crate::scene) specular: f32,
@@ -59,7 +58,7 @@ pub(in crate::scene) enum Layer {
     Base,
     Coat,
     Sheen,
-    /// The reflection of the far side, seen through the surface.
+    /// Far side of the surface, whose reflection is seen through the surface.
     Behind,
 }
 
@@ -72,11 +71,11 @@ pub(in crate::scene) struct Taken {
     /// Shading normal of the layer.
     pub(in crate::scene) normal: Vec3,
     pub(in crate::scene) probability: f32,
-    /// Probability that a layer of the viewer's side is chosen: any but [`Layer::Behind`].
+    /// Probability with which any layer except [`Layer::Behind`] is chosen.
     pub(in crate::scene) of_front: f32,
 }
 
-/// All layers of a material at a point, each attenuated by the layers above.
+/// Scattering of all layers of a material at a point, each attenuated by the layers above it.
 struct Stack {
     base: Scattering,
     behind: Reflection,
@@ -84,9 +83,9 @@ struct Stack {
     coat: Scattering,
 }
 
-/// Chooses a layer of a material at a point. `coat_normal` is the coat's shading normal. `random` returns
-/// numbers in [0, 1): number 0 chooses the layer, 1 and 2 choose the microfacet of rough glass. The value 0
-/// of number 0 chooses the base.
+/// Chooses a layer of a material at a point. `coat_normal` is the coat's shading normal. `random(i)` must
+/// return random number `i` in [0, 1): number 0 chooses the layer, and 1 and 2 the microfacet of rough glass.
+/// `random(0) == 0` chooses the base.
 #[inline(never)]
 pub(in crate::scene) fn take(
     (material, layers): (&Material, &Layers),
@@ -151,7 +150,7 @@ impl Stack {
             Layer::Sheen => (Scattering::of_lobe(Lobe::Sheen(self.sheen)), normal),
             Layer::Behind => (Scattering { reflection: self.behind, ..Scattering::BLACK }, -normal),
         };
-        // A ray inside glass has come through the glass, whichever layer it continues by.
+        // A ray that arrives inside glass was absorbed on its way, whichever layer is chosen.
         let scattering = Scattering { absorption: self.base.absorption, ..scattering };
         let mut scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
         scattering.specular.straight *= probability;
@@ -159,7 +158,7 @@ impl Stack {
     }
 }
 
-/// Multiplies the specular and transmission factors of a material by the values of their textures.
+/// Multiplies a material's specular and transmission factors by the values of their textures.
 fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material {
     let mut material = *material;
     match &mut material.reflectance {
@@ -178,8 +177,8 @@ fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material 
     material
 }
 
-/// Scattering of the coat, a lobe or at roughness 0 a mirror, for an outgoing direction at `cosine` to the
-/// coat's normal; and `F(n.o)`, by which glTF attenuates everything below the coat.
+/// Returns the scattering of the coat (a lobe; at roughness 0 a mirror) and `F(n.o)`, by which glTF
+/// attenuates everything below the coat. `cosine` is `n.o`, with the coat's normal `n`.
 fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     let factor = layers.coat * texel.coat;
     if factor <= 0.0 {
@@ -208,14 +207,14 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     }
 }
 
-/// The part of a material's reflection that photons light: the base without its narrow lobe.
+/// Part of a material's reflection that is estimated from photons: the base without its narrow lobe.
 pub(super) fn lit_by_photons(material: &Material, texel: &Texel, view: &View) -> Reflection {
     let none = LayerTexel::WHITE;
     let (base, _) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
     base.reflection.without_narrow_lobe()
 }
 
-/// Scattering of the base, and the reflection of the far side that is seen through the base.
+/// Returns the scattering of the base, and the reflection of the far side as seen through the base.
 fn base(
     material: &Material,
     layers: (&Layers, &LayerTexel),
@@ -247,9 +246,9 @@ fn base(
     (base, Reflection::lambertian(white.reflection.diffuse * colour * share))
 }
 
-/// Scattering of rough glass. The far side of a thin wall is seen through a GGX lobe. The surface of a volume
-/// is perfectly specular at a microfacet sampled by visible normals (Walter et al. 2007), except for the
-/// reflection outside, which is a lobe.
+/// Does `base` for rough glass. A thin wall transmits by a GGX lobe on its far side. A volume reflects by a
+/// GGX lobe outside. Inside it reflects, and on both sides it transmits, perfectly specularly at a microfacet
+/// that is sampled by visible normals (Walter et al. 2007).
 fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;
@@ -301,14 +300,13 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     (Scattering { reflection, specular, absorption }, Reflection::BLACK)
 }
 
-/// Sum of the albedos of all continuations of a path at a point, by maximum channel: Lambertian part, lobe,
-/// specular reflection, transmission.
+/// Sum of the maximum channels of four albedos: Lambertian part, lobe, specular reflection, transmission.
 fn albedo(Scattering { reflection, specular, .. }: &Scattering) -> f32 {
     let Reflection { diffuse, lobe } = reflection;
     [*diffuse, lobe.albedo(), specular.reflected, specular.transmitted].into_iter().map(max_component).sum()
 }
 
-/// Multiplies scattering by a colour.
+/// Multiplies reflection, specular reflection and transmission by a colour.
 fn dimmed(scattering: Scattering, colour: Vec3) -> Scattering {
     let Scattering { reflection, specular, .. } = scattering;
     let specular = Specular {

@@ -1,5 +1,5 @@
-//! Models of a lobe. Each model is a file in this directory and a case of the enum [`Lobe`], of
-//! [`super::Reflector`] and of [`super::PartialReflection`].
+//! Models of a lobe. Each has a module in this directory, and a case in [`Lobe`], [`super::Reflector`] and
+//! [`super::PartialReflection`].
 
 use glam::Vec3;
 
@@ -15,7 +15,7 @@ pub(super) enum Lobe {
     Phong(PhongLobe),
     /// GGX lobe of glTF's metallic-roughness model.
     Ggx(GgxLobe),
-    /// Sheen lobe of `KHR_materials_sheen`, always followed by rays instead of being estimated from photons.
+    /// Sheen lobe of `KHR_materials_sheen`. Rays follow it; no photons are gathered for it.
     Sheen(SheenLobe),
 }
 
@@ -32,8 +32,8 @@ impl Lobe {
         }
     }
 
-    /// Albedo of the lobe: for Phong at normal incidence; for GGX and sheen for the outgoing direction given
-    /// when the lobe was built.
+    /// Albedo of the lobe: of a Phong lobe at normal incidence; of a GGX or sheen lobe for its outgoing
+    /// direction.
     #[inline(always)]
     pub(super) fn albedo(&self) -> Vec3 {
         match self {

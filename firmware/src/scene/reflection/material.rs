@@ -1,5 +1,5 @@
-//! Converts materials to the scattering towards one direction. The factors of a material's record are
-//! multiplied by those of textures and vertex colours.
+//! Computes the scattering of a material towards one direction. The material's factors are multiplied by the
+//! values of textures and vertex colours.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance};
@@ -10,10 +10,10 @@ use super::metallic_roughness::MetallicRoughness;
 use crate::scene::shading_normal::bent;
 use crate::scene::specular::{Bounds, Glass, Specular};
 
-/// Factors of a material at a point, from textures and vertex colours.
+/// Values of textures and vertex colours at a point, by which a material's factors are multiplied.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Texel {
-    /// Factor of the base colour or the diffuse albedo.
+    /// Factor of the base colour, or of the diffuse albedo of a Phong material.
     pub(in crate::scene) colour: Vec3,
     pub(in crate::scene) roughness: f32,
     pub(in crate::scene) metallic: f32,
@@ -23,7 +23,7 @@ impl Texel {
     pub(in crate::scene) const WHITE: Self = Self { colour: Vec3::ONE, roughness: 1.0, metallic: 1.0 };
 }
 
-/// Direction from which a point is seen, with the normals on the viewer's side.
+/// Direction from which a point is seen, and the normals on that side.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct View {
     /// Unit direction to the viewer.
@@ -34,8 +34,8 @@ pub(in crate::scene) struct View {
 }
 
 impl View {
-    /// Cosine between the direction to the viewer and the [`bent`] shading normal, by which lobes and mirrors
-    /// reflect.
+    /// Cosine between the direction to the viewer and the [`bent`] shading normal, which lobes and mirrors
+    /// use.
     #[inline(always)]
     pub(super) fn glossy_cosine(&self) -> f32 {
         let [normal, geometric_normal] = self.normals;
@@ -43,7 +43,6 @@ impl View {
     }
 }
 
-/// Scattering at a point: reflection, perfectly specular part, absorption.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Scattering {
     pub(in crate::scene) reflection: Reflection,
@@ -63,7 +62,7 @@ impl Scattering {
     }
 }
 
-/// Scattering of a material at a point, without [layers](super::layered).
+/// Scattering of a material's base at a point, without its other [layers](super::layered).
 #[inline(always)]
 pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &View) -> Scattering {
     let View { outgoing, normals, is_front } = *view;

@@ -2,9 +2,9 @@
 //!
 //! - The lobe is a [`GgxLobe`]. With `m = metallic`, `F0` is `(1 - m)` times the dielectric's F0 plus `m`
 //!   times the base colour; `F90` is `(1 - m)` times `specularFactor` (`KHR_materials_specular`) plus `m`.
-//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`. `F` is the mean over uniform light of
-//!   the dielectric's `F(h.o)`, by which appendix B weights the base. `E` is the maximum channel of the
-//!   lobe's albedo towards `o`, which exceeds `F` at grazing views.
+//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`. `F` is the dielectric's `F(h.o)`, the
+//!   weight in appendix B, averaged over uniform light from all directions. `E` is the maximum channel of the
+//!   dielectric lobe's albedo towards `o`, which exceeds `F` at grazing views.
 //! - At roughness 0 the lobe is perfectly specular, with Schlick's reflectance.
 
 use glam::Vec3;
@@ -15,7 +15,7 @@ use super::lobe::Lobe;
 use crate::scene::specular::Specular;
 use crate::vector::{max, max_component, min};
 
-/// A metallic-roughness surface at a point, with textures applied.
+/// Parameters of a metallic-roughness surface at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MetallicRoughness {
     pub(super) base: Vec3,
@@ -32,7 +32,7 @@ pub(super) struct MetallicRoughness {
 }
 
 impl MetallicRoughness {
-    /// Reflection at a roughness above 0, for an outgoing direction at `cosine` to the normal.
+    /// Reflection at a roughness above 0. `cosine` is the cosine between outgoing direction and normal.
     pub(super) fn reflection(&self, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0, f90, cosine);
@@ -41,7 +41,7 @@ impl MetallicRoughness {
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
     }
 
-    /// Reflection that consists of the lobe times `share` and a Lambertian part with the albedo `diffuse`.
+    /// Sum of the lobe multiplied by `share` and a Lambertian part with the albedo `diffuse`.
     pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0 * share, f90 * share, cosine);
@@ -56,8 +56,8 @@ impl MetallicRoughness {
         if self.is_compensated { lobe.compensated() } else { lobe }
     }
 
-    /// Lambertian and perfectly specular part at roughness 0, for an outgoing direction at `cosine` to the
-    /// normal.
+    /// Lambertian part and perfectly specular part at roughness 0. `cosine` is the cosine between outgoing
+    /// direction and normal.
     pub(super) fn smooth(&self, cosine: f32) -> (Reflection, Specular) {
         let rest = 1.0 - cosine;
         let squared = rest * rest;
@@ -69,29 +69,28 @@ impl MetallicRoughness {
         (Reflection::lambertian(diffuse), Specular::mirror(towards(f0, f90, share)))
     }
 
-    /// Mean of the dielectric's `F(h.o)` over the directions of uniform light, for the cosine between normal
-    /// and `o`. The base is multiplied by `1 - F` (glTF 2.0, appendix B.2.4), or by 1 minus the lobe's albedo
-    /// where that albedo is greater.
+    /// Mean of the dielectric's `F(h.o)` over uniform light from all directions (the `F` of the module's
+    /// formula). `cosine` is `n.o`.
     fn mean_fresnel(&self, cosine: f32) -> f32 {
         let f0 = max_component(self.dielectric);
         f0 + (self.grazing - f0) * mean_schlick(cosine)
     }
 
-    /// F0 and F90 of the mixture of metal and dielectric.
+    /// `[F0, F90]` of the mixture of metal and dielectric.
     fn mixed(&self) -> [Vec3; 2] {
         let mix = |dielectric: Vec3, metal: Vec3| towards(dielectric, metal, self.metallic);
         [mix(self.dielectric, self.base), mix(Vec3::splat(self.grazing), Vec3::ONE)]
     }
 }
 
-/// Mean of `(1 - h.o)^5` over the directions `i` of uniform light, where `h` is the half vector of `i` and
-/// `o`, and `cosine` is `n.o`: a fit with an error of 0.0001.
+/// Cosine-weighted mean of `(1 - h.o)^5` over all directions `i` of incident light, by a fit with an error of
+/// 0.0001. `h` is the half vector of `i` and `o`; `cosine` is `n.o`.
 fn mean_schlick(cosine: f32) -> f32 {
     let rest = 1.0 - min(max(cosine, 0.0), 1.0);
     rest * (0.0045 + rest * (rest * 0.0257 - 0.0021))
 }
 
-/// Linear interpolation from `from`, at share 0, to `to`, at share 1.
+/// Linear interpolation: `from` at `share` 0, `to` at `share` 1.
 fn towards(from: Vec3, to: Vec3, share: f32) -> Vec3 {
     from * (1.0 - share) + to * share
 }

@@ -1,5 +1,5 @@
-//! Reflection without perfectly specular parts ([`super::Specular`]): values, densities, samples, and the
-//! records of gathers.
+//! Reflection functions without their perfectly specular part ([`super::Specular`]): evaluation, sampling,
+//! and the form stored in the gather queue.
 //!
 //! | question | answered by |
 //! |---|---|
@@ -8,9 +8,8 @@
 //! | materials that photons are stored on | [`keeps_photons`] |
 //! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
 //!
-//! A reflection is a Lambertian part and one lobe. Callers need to know neither the lobe's model nor its
-//! parameters. A model is a file here, such as `phong` and `ggx`, and a case in `lobe`, [`Reflector`] and
-//! [`PartialReflection`].
+//! A reflection is a Lambertian part and one lobe. Each model of a lobe has a module here, such as `phong` or
+//! `ggx`, and a case in `lobe`, [`Reflector`] and [`PartialReflection`]. Callers need not know the model.
 
 mod ggx;
 mod ggx_albedo;
@@ -40,10 +39,10 @@ use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
-/// Maximum `a = roughness^2` of a sharp lobe, as for the denoising features of Cycles.
+/// Maximum `a = roughness^2` of a sharp lobe, equal to the limit of Cycles for denoising features.
 const MAX_SHARP_ALPHA: f32 = 0.075;
 
-/// Parameters of a reflection function `f`: a Lambertian part and a lobe.
+/// Reflection function `f`: the sum of a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
     /// Lambertian albedo, 0 to 1.
@@ -79,15 +78,15 @@ impl Reflection {
         max_component(self.diffuse) > 0.0
     }
 
-    /// Returns true if no lobe reflects light.
+    /// Returns true if the lobe reflects nothing.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         !self.lobe.reflects()
     }
 
-    /// Returns true if there is a narrow lobe: photons cannot resolve it, because few or none of the k
-    /// nearest arrive within it. Gather rays and photons follow a narrow lobe as they follow perfectly
-    /// specular surfaces; an eye path ends there, and gather rays are cast.
+    /// Returns true if the lobe is narrow: a density estimate cannot resolve it, because few of the k nearest
+    /// photons arrive within it. Gather rays and photons continue in a sampled direction of a narrow lobe. An
+    /// eye path ends there, and gather rays are cast.
     #[inline(always)]
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
@@ -97,14 +96,14 @@ impl Reflection {
         }
     }
 
-    /// Fraction of the albedo that a sharp GGX lobe has; 0 without such a lobe. Objects can be recognised in
-    /// the reflection of a sharp lobe.
+    /// Fraction of the albedo that a sharp GGX lobe contributes; 0 without one. A lobe is sharp if objects
+    /// can be recognised in its reflection.
     pub fn sharp_share(&self) -> f32 {
         let is_sharp = matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.alpha() <= MAX_SHARP_ALPHA);
         if is_sharp { self.glossy_share() } else { 0.0 }
     }
 
-    /// Fraction of the albedo that a GGX lobe has; 0 without a GGX lobe.
+    /// Fraction of the albedo that a GGX lobe contributes; 0 without one.
     #[inline(always)]
     pub(super) fn glossy_share(&self) -> f32 {
         match &self.lobe {
@@ -116,15 +115,15 @@ impl Reflection {
         }
     }
 
-    /// Removes a narrow lobe. The rest of the reflection is estimated from photons.
+    /// Removes the lobe if it is narrow. The remaining reflection is estimated from photons.
     #[inline(always)]
     #[must_use]
     pub fn without_narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
     }
 
-    /// Returns true if there is a narrow lobe that takes light from the caustic map: from photons of lights
-    /// without an area, whose caustics a gather ray of the lobe would rarely find.
+    /// Returns true if the lobe is narrow and caustic photons of lights without an area are gathered for it.
+    /// Gather rays would rarely find the caustics of such lights.
     #[inline(always)]
     pub fn gathers_caustics(&self) -> bool {
         match &self.lobe {
@@ -133,16 +132,14 @@ impl Reflection {
         }
     }
 
-    /// Returns true if photons of lights without an area are stored in the caustic map for the sake of a
-    /// narrow lobe.
+    /// Returns true if caustic photons of lights without an area must be stored because of a narrow lobe.
     #[inline(always)]
     pub fn keeps_caustics(&self) -> bool {
         self.gathers_caustics()
             && !matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.estimate == Estimate::RayBesideBase)
     }
 
-    /// Reduces the reflection to the narrow lobe, marked as [`Estimate::RayBesideBase`]: photons are stored
-    /// for the Lambertian part beside the lobe.
+    /// Removes the Lambertian part, and marks the narrow lobe as [`Estimate::RayBesideBase`].
     #[must_use]
     pub(in crate::scene) fn narrow_lobe_beside_base(self) -> Self {
         let mut part = self.narrow_lobe();
@@ -154,13 +151,13 @@ impl Reflection {
         part
     }
 
-    /// Reduces the reflection to the narrow lobe; black if there is none.
+    /// Removes the Lambertian part; black if the lobe is not narrow.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { self.without_lambertian() } else { Self::BLACK }
     }
 
-    /// Reduces the reflection to the lobe, narrow or wide.
+    /// Removes the Lambertian part.
     #[inline(always)]
     #[must_use]
     pub fn without_lambertian(self) -> Self {

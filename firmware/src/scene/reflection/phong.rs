@@ -1,6 +1,6 @@
-//! Phong's cosine lobe, normalised (Lafortune, Willems 1994, *Using the modified Phong reflectance model for
-//! physically based rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the
-//! mirror direction. Its directions are sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
+//! Normalised Phong lobe (Lafortune, Willems 1994, *Using the modified Phong reflectance model for physically
+//! based rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, where alpha is the angle to the mirror
+//! direction. Directions are sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -26,7 +26,7 @@ impl PhongLobe {
         max_component(self.albedo) > 0.0
     }
 
-    /// `max(0, cos alpha)^n`, with the angle alpha between two unit vectors.
+    /// `max(0, cos alpha)^n`, where alpha is the angle between two unit vectors.
     #[inline(always)]
     pub(super) fn power(&self, mirror: Vec3, direction: Vec3) -> f32 {
         power(mirror.dot(direction), self.exponent)
@@ -56,8 +56,7 @@ impl PhongLobe {
         (self.exponent + 2.0) / (self.exponent + 1.0)
     }
 
-    /// Samples a direction with density `p` about the mirror direction, by inversion of the cumulative
-    /// distribution function at a point of the unit square.
+    /// Maps a point of the unit square to a direction about the mirror direction, with density `p`.
     #[inline(always)]
     pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));
@@ -66,7 +65,7 @@ impl PhongLobe {
     }
 }
 
-/// `max(0, cosine)^exponent`. For every exponent, including 0, the result is 0 if the cosine is not positive.
+/// `max(0, cosine)^exponent`; 0 if the cosine is not positive, even for the exponent 0.
 #[inline(always)]
 pub(super) fn power(cosine: f32, exponent: f32) -> f32 {
     if cosine > 0.0 { libm::powf(cosine, exponent) } else { 0.0 }

@@ -10,8 +10,8 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// Returns true if photons are stored on surfaces of a material: its base has, at some texel, a reflection
-/// besides a narrow lobe.
+/// Returns true if photons are stored on surfaces of a material. This is so if, at some texel, its base
+/// reflects light other than by a narrow lobe.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -30,9 +30,9 @@ pub fn keeps_photons(
     Ok(metallic.into_iter().any(|metallic| keeps(material, metallic)))
 }
 
-/// Returns true if photons are stored where textures have the value 1, except for the metalness `metallic`:
-/// the reflection without a narrow lobe is not black, seen along the normal, where smooth coats reflect
-/// least. If photons are stored at some metalness in a range, they are stored at one of the range's ends.
+/// Returns true if photons are stored at a texel with the metalness `metallic` and 1 in all other textures.
+/// The view is along the normal, where the dielectric's Fresnel reflection, which dims the base, is least. If
+/// photons are stored at some metalness in a range, they are stored at one of the range's ends.
 fn keeps(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };
@@ -87,7 +87,7 @@ mod tests {
         })
     }
 
-    /// Texels with colours and roughnesses of 0, 1/2 and 1 and one metalness, each with views of both sides.
+    /// Texels of one metalness, with colours and roughnesses of 0, 1/2 and 1, seen from both sides.
     fn sights(metallic: f32) -> Vec<(Texel, View)> {
         let mut sights = Vec::new();
         for index in 0..81 {

@@ -1,4 +1,4 @@
-//! Reflection function in the record of a waiting gather, and its evaluation for photons.
+//! Reflection function in the compact form that the gather queue stores, and its evaluation for photons.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
@@ -11,12 +11,11 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
-/// A reflection function, evaluated as far as it does not depend on a photon, in 13 bytes: `S_B` of
-/// Steinhurst's dissertation (2007, section 7.4).
+/// A reflection function in 13 bytes, of which all that does not depend on a photon is evaluated (`S_B` in
+/// Steinhurst's dissertation, 2007, section 7.4).
 ///
-/// Stage one, [`Self::encode`], is done once per gather: albedos, weight, units and the lobe's constant
-/// factor become two colours. Stage two, [`Self::lobe_factor`], is done once per photon. Colours are rounded
-/// to a shared exponent, in the same way for every order of gathers.
+/// [`Self::encode`] is called once per gather: it combines albedos, weight, units and the lobe's constant
+/// factor into two colours. [`Self::lobe_factor`] is called once per photon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartialReflection {
     diffuse: Rgbe,
@@ -28,8 +27,8 @@ pub struct PartialReflection {
 const _: () = assert!(size_of::<PartialReflection>() == 13);
 
 impl PartialReflection {
-    /// Encodes a reflector's `f` towards its outgoing direction, times `weight`. Random bits in `dither` make
-    /// the rounding unbiased.
+    /// Encodes `weight` times a reflector's `f` towards its outgoing direction. Colours are rounded to a
+    /// shared exponent, at random by the bits of `dither`, so that the rounding is unbiased.
     // One copy for final gathers and caustics: code is memory on a chip.
     #[inline(never)]
     pub fn encode(reflector: &Reflector, weight: Vec3, dither: u32) -> Self {
@@ -53,8 +52,8 @@ impl PartialReflection {
         }
     }
 
-    /// Encodes a reflection that is evaluated at once, without the gather queue. Also returns its lobe,
-    /// unrounded if GGX.
+    /// Encodes a reflection that is evaluated at once instead of being put into the gather queue. Also
+    /// returns its lobe: a GGX lobe unrounded, a Phong lobe decoded from the record.
     pub fn encode_present(reflector: &Reflector, weight: Vec3, dither: u32) -> (Self, DecodedLobe) {
         let record = Self::encode(reflector, weight, dither);
         let Lobe::Ggx(lobe) = &reflector.reflection.lobe else { return (record, record.decode_lobe()) };
@@ -64,13 +63,13 @@ impl PartialReflection {
         (Self { lobe, ..record }, DecodedLobe::Ggx(kernel))
     }
 
-    /// Replaces the code of the surface normal, by which photons of the surface are recognised.
+    /// Replaces the code of the surface normal, by which a gather recognises photons of the surface.
     #[must_use]
     pub fn among(self, normal: u8) -> Self {
         Self { normal, ..self }
     }
 
-    /// Encodes `f = 1`, for which the reflected radiance is the irradiance. `normal` is the code of the
+    /// Encodes `f = 1`, for which the reflected radiance equals the irradiance. `normal` is the code of the
     /// surface normal.
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
@@ -78,7 +77,7 @@ impl PartialReflection {
         Self { diffuse, lobe: Rgbe::default(), shape: Shape([0; 4]), normal }
     }
 
-    /// Returns true if there is no lobe, so that the reflected radiance does not depend on the directions of
+    /// Returns true if there is no lobe. The reflected radiance then does not depend on the directions of
     /// photons.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
@@ -92,7 +91,7 @@ impl PartialReflection {
         third & GGX != 0
     }
 
-    /// Factor by which the Lambertian part multiplies photon power.
+    /// Lambertian `f` times the weight: the factor by which photon power is multiplied.
     #[inline(always)]
     pub fn lambertian(&self) -> Vec3 {
         self.diffuse.decode().into()
@@ -107,8 +106,8 @@ impl PartialReflection {
         self.shape.decode()
     }
 
-    /// Factor of a photon's power in the sum over photons for the lobe. `direction` is the code of the
-    /// direction from which the photon came.
+    /// Value of the lobe for a photon, without the record's colour: a gather sums power times this factor.
+    /// `direction` is the code of the direction from which the photon came.
     #[inline(always)]
     pub fn lobe_factor(lobe: &DecodedLobe, direction: [u8; 2]) -> Vec3 {
         let incident = unit(decode_direction(direction).into());
@@ -118,8 +117,8 @@ impl PartialReflection {
         })
     }
 
-    /// Reflected power of photons, times the weight of [`Self::encode`]: `power` is the sum of the photons'
-    /// powers, `lobe` the sum of powers times [`Self::lobe_factor`].
+    /// Sum of the photons' reflected power, times the weight given to [`Self::encode`]. `power` is the sum of
+    /// their powers; `lobe` is the sum of power times [`Self::lobe_factor`].
     #[inline(always)]
     pub fn reflected(&self, power: &ColourSum, lobe: &ColourSum) -> Vec3 {
         self.lambertian() * power.value() + Vec3::from_array(self.lobe.decode()) * lobe.value()
@@ -146,13 +145,13 @@ pub enum DecodedLobe {
     Ggx(Kernel),
 }
 
-/// Parameters of a lobe except its colour. The highest bit of the third byte selects the model.
+/// Parameters of a lobe without its colour. The highest bit of the third byte selects the model.
 ///
 /// - Phong, if the bit is clear: two bytes of the mirror direction, and a bfloat16 of the exponent, which is
 ///   not negative.
 /// - GGX, if the bit is set: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow
-///   lobes are not gathered ([`super::Reflection::has_narrow_lobe`]), so that an encoded lobe is ten times as
-///   wide as the steps of the directions.
+///   lobes are not encoded ([`super::Reflection::has_narrow_lobe`]); the others are at least ten times as
+///   wide as the rounding steps of the directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape([u8; 4]);
 
@@ -203,16 +202,16 @@ impl Shape {
     }
 }
 
-/// Number of steps of a direction's octahedral coordinate, in a byte and in six bits.
+/// Greatest code of a direction's octahedral coordinate: in a byte, and in six bits.
 const STEPS: [u32; 2] = [254, 62];
 
-/// Rounds a direction's coordinate from a byte to six bits.
+/// Rounds the code of an octahedral coordinate from a byte to six bits.
 fn coarse(byte: u8) -> u8 {
     let [fine, coarse] = STEPS;
     ((u32::from(byte).min(fine) * coarse + fine / 2) / fine) as u8
 }
 
-/// Extends a direction's coordinate from six bits to a byte.
+/// Extends the code of an octahedral coordinate from six bits to a byte.
 fn fine(bits: u8) -> u8 {
     let [fine, coarse] = STEPS;
     ((u32::from(bits).min(coarse) * fine + coarse / 2) / coarse) as u8

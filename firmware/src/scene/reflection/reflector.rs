@@ -1,17 +1,17 @@
-//! A reflection seen from one direction: its values, densities and samples.
+//! Evaluation and sampling of a reflection for one outgoing direction.
 //!
-//! A sample's point of the unit square is mapped to a direction such that neighbours stay neighbours; a
-//! stratified pattern is therefore stratified on the hemisphere too. The Lambertian part and the lobe share
-//! the samples in proportion to their albedos, and the density of the mixture weights each sample (balance
-//! heuristic: Veach, Guibas 1995). This bounds the weight by the sum of the albedos and avoids fireflies.
+//! Sampling maps a point of the unit square to a direction, and neighbouring points to neighbouring
+//! directions. Stratified points therefore give stratified directions. The Lambertian part and the lobe are
+//! sampled in proportion to their albedos. Each sample is weighted by the density of the mixture (balance
+//! heuristic: Veach, Guibas 1995), which bounds the weight and avoids fireflies.
 //!
-//! On a triangle whose shading normal `n` is not its normal `g`, a part of the lobe lies below the triangle.
-//! That part is mirrored in the triangle, so that no light is lost: with `i' = i - 2 (g.i) g`, the lobe has
-//! `f(i) + f(i') max(0, n.i') / n.i` for `i` above the triangle, and the density `p(i) + p(i')`.
+//! If the shading normal `n` differs from the triangle's normal `g`, the part of the lobe below the triangle
+//! is mirrored in the triangle, so that no light is lost. With `i' = i - 2 (g.i) g`, the lobe's value for `i`
+//! above the triangle is `f(i) + f(i') max(0, n.i') / n.i`, and the density is `p(i) + p(i')`.
 //!
-//! The eye thus receives `f(i) n.i + f(i') max(0, n.i')` of the light from `i`. A photon from `i` therefore
-//! counts as two photons, one from `i` and one from `i'`, each of which is reflected by the lobe about the
-//! shading normal. One of the two, chosen at random, is followed with twice the weight.
+//! Light from `i` thus reaches the eye with the factor `f(i) n.i + f(i') max(0, n.i')`. A photon from `i` is
+//! therefore treated as two photons, one from `i` and one from `i'`, each reflected by the lobe about `n`.
+//! One of the two is chosen at random and followed with twice the weight.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -24,7 +24,7 @@ use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
 use crate::vector::{from_frame, max, max_component, mirror};
 
-/// A sampled direction of reflection, and the weight of the sample.
+/// Sampled direction, and the weight of the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReflectedDirection {
     /// Unit vector away from the surface.
@@ -33,21 +33,22 @@ pub struct ReflectedDirection {
     pub weight: Vec3,
 }
 
-/// The reflection at a point, seen from one direction.
+/// Reflection at a point towards one outgoing direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflector {
     /// Unit shading normal on the side of `outgoing`.
     pub normal: Vec3,
     /// Unit normal of the triangle on the side of `outgoing`.
     pub geometric_normal: Vec3,
-    /// Unit vector towards which light is reflected, on the eye's side of a path.
+    /// Unit vector away from the surface, towards the eye. For `Self::sample_photon`, the direction from
+    /// which the photon arrives.
     pub outgoing: Vec3,
     /// Reflection at the point.
     pub reflection: Reflection,
 }
 
 impl Reflector {
-    /// BRDF `f`, 1/sr, for light from a unit vector above the triangle, on the normal's side.
+    /// BRDF `f`, 1/sr, for light from the unit vector `incident`, above triangle and shading horizon.
     #[inline(always)]
     pub fn evaluate(&self, incident: Vec3) -> Vec3 {
         if self.reflection.is_lambertian() {
@@ -60,7 +61,7 @@ impl Reflector {
         self.lambertian() + value
     }
 
-    /// `f` of the lobe about the shading normal, 1/sr, without the part that [`Self::raised`] mirrors.
+    /// `f` of the lobe about the shading normal, 1/sr, without the mirrored part (see the module).
     #[inline(always)]
     fn lobe_value(&self, incident: Vec3) -> Vec3 {
         match &self.reflection.lobe {
@@ -70,9 +71,8 @@ impl Reflector {
         }
     }
 
-    /// For a direction above the triangle: the direction below it whose part of the lobe is mirrored to
-    /// `direction`, and the ratio of the two directions' cosines to the shading normal, 0 to 1; `None` if no
-    /// part of the lobe is mirrored to `direction`.
+    /// Returns `i'` and `n.i' / n.i`, 0 to 1, where `i` is `direction` and `i'` is its mirror image below the
+    /// triangle; `None` if no part of the lobe is mirrored from `i'` to `i`.
     #[inline(always)]
     fn mirrored_part(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         if self.normal == self.geometric_normal {
@@ -83,8 +83,8 @@ impl Reflector {
         (cosine_below > 0.0 && cosine > cosine_below).then(|| (below, cosine_below / cosine))
     }
 
-    /// Mirrors a direction of the lobe in the triangle if the direction lies below the triangle and above the
-    /// shading horizon.
+    /// Mirrors a direction in the triangle if it lies below the triangle but above the shading horizon;
+    /// otherwise returns it unchanged.
     #[inline(always)]
     fn raised(&self, direction: Vec3) -> Vec3 {
         let is_below = self.normal != self.geometric_normal
@@ -105,13 +105,13 @@ impl Reflector {
         self.reflection.diffuse
     }
 
-    /// Albedo of Lambertian part and lobe together, 0 to 1.
+    /// Sum of the albedos of Lambertian part and lobe, 0 to 1.
     #[inline(always)]
     pub fn albedo(&self) -> Vec3 {
         self.reflection.diffuse + self.reflection.lobe.albedo()
     }
 
-    /// Maximum channel of the Lambertian albedo, and of the lobe's albedo.
+    /// Maximum channels of two albedos: `[Lambertian part, lobe]`.
     #[inline(always)]
     pub fn albedos(&self) -> [f32; 2] {
         [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo())]
@@ -131,8 +131,8 @@ impl Reflector {
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// Sharpness of the lobe: the exponent `n` of a lobe `cos^n alpha` with the same width. For a GGX lobe
-    /// the exponent is `1 / (2 a^2)` (Walter et al. 2007).
+    /// Exponent `n` of a Phong lobe `cos^n alpha` as wide as the lobe. It is `1 / (2 a^2)` for a GGX lobe
+    /// (Walter et al. 2007), and 0 for a sheen lobe.
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
         match &self.reflection.lobe {
@@ -148,17 +148,17 @@ impl Reflector {
         self.raised(self.lobe_direction(point))
     }
 
-    /// Samples the lobe alone by a point of the unit square, with the weight `f cos(theta) / p` of the lobe.
-    /// The weight is zero, and the direction meaningless, if the sampled direction lies below the shading
-    /// horizon.
+    /// Samples the lobe alone by a point of the unit square. The weight is the lobe's `f cos(theta) / p`. If
+    /// the sampled direction lies below the shading horizon, the weight is zero and the direction is
+    /// meaningless.
     pub fn sample_lobe_alone(&self, point: [f32; 2]) -> ReflectedDirection {
         let direction = self.lobe_direction(point);
         ReflectedDirection { direction: self.raised(direction), weight: self.lobe_weight(direction) }
     }
 
-    /// Samples the lobe alone for a photon that arrives from `outgoing`, by a point of the unit square: the
-    /// adjoint of [`Self::sample_lobe_alone`]. Also returns the direction from which the photon is taken to
-    /// come: `outgoing`, or the mirror image of `outgoing` below the triangle.
+    /// Samples the lobe alone for a photon that arrives from `outgoing`: the adjoint of
+    /// [`Self::sample_lobe_alone`]. Also returns the direction `i` or `i'` from which the photon is assumed
+    /// to come (see the module): `outgoing`, or its mirror image below the triangle.
     pub fn sample_photon(&self, [u, v]: [f32; 2]) -> (Vec3, ReflectedDirection) {
         let below = -mirror(self.outgoing, self.geometric_normal);
         let is_of_two = self.normal != self.geometric_normal && self.normal.dot(below) > 0.0;
@@ -169,8 +169,8 @@ impl Reflector {
         (from, ReflectedDirection { direction, weight: lobe.lobe_weight(direction) * of_two })
     }
 
-    /// Maps a point of the unit square to a direction of the lobe about the shading normal, not yet
-    /// [`Self::raised`].
+    /// Maps a point of the unit square to a direction of the lobe about the shading normal. The direction may
+    /// lie below the triangle.
     #[inline(always)]
     fn lobe_direction(&self, point: [f32; 2]) -> Vec3 {
         match &self.reflection.lobe {
@@ -180,8 +180,8 @@ impl Reflector {
         }
     }
 
-    /// Weight `f cos(theta) / p` of a direction from [`Self::lobe_direction`], dimensionless; zero below the
-    /// shading horizon.
+    /// Weight `f cos(theta) / p`, dimensionless, of a direction sampled by [`Self::lobe_direction`]; zero
+    /// below the shading horizon.
     fn lobe_weight(&self, direction: Vec3) -> Vec3 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
@@ -193,8 +193,8 @@ impl Reflector {
         }
     }
 
-    /// Ratio `f / (albedo p)` of the lobe about the shading normal, without the part mirrored in the
-    /// triangle, dimensionless, for a direction above the surface.
+    /// Ratio `f / (albedo p)`, dimensionless, of the lobe about the shading normal, without the mirrored part
+    /// (see the module). `direction` must lie above the surface.
     #[inline(always)]
     pub fn lobe_gain(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -204,7 +204,7 @@ impl Reflector {
         }
     }
 
-    /// Probability density of [`Self::sample_lobe`], 1/sr, for a direction above the triangle; 0 without a
+    /// Probability density, 1/sr, of [`Self::sample_lobe`] at a direction above the triangle; 0 without a
     /// lobe.
     #[inline(always)]
     pub fn lobe_density(&self, direction: Vec3) -> f32 {
@@ -224,7 +224,7 @@ impl Reflector {
         }
     }
 
-    /// BRDF `f` and [`Self::lobe_density`], both 1/sr, of a sampled direction. Computing both at once is
+    /// BRDF `f` and [`Self::lobe_density`] at a sampled direction, both 1/sr. Computing them together is
     /// cheaper.
     #[inline(always)]
     pub fn sampled(&self, direction: Vec3) -> (Vec3, f32) {
@@ -253,8 +253,8 @@ impl Reflector {
         }
     }
 
-    /// Samples Lambertian part and lobe by a point of the unit square; `None` if the direction lies below the
-    /// surface, where the weight is zero.
+    /// Samples the sum of Lambertian part and lobe by a point of the unit square. Returns `None` if the
+    /// sampled direction lies below the shading horizon, where the weight is zero.
     pub fn sample(&self, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
         let Self { normal, reflection, .. } = *self;
         let diffuse_share = self.diffuse_share();
@@ -293,8 +293,8 @@ impl Reflector {
     }
 }
 
-/// Maps a point of the unit square to a direction with density `cos(theta) / pi`: the square is mapped to the
-/// disc (Shirley, Chiu 1997), and the disc is projected up to the hemisphere.
+/// Maps a point of the unit square to a direction with density `cos(theta) / pi`. The square is mapped to the
+/// unit disc (Shirley, Chiu 1997), and the disc is projected onto the hemisphere.
 #[inline(always)]
 fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let [a, b] = [2.0 * u - 1.0, 2.0 * v - 1.0];

@@ -4,9 +4,9 @@
 //! - `D = (2 + 1/a) sin^(1/a)(n, h) / (2 pi)`;
 //! - `G = 1 / (1 + l(n.o) + l(n.i))`, where `l` is the fit of Estevez and Kulla.
 //!
-//! Directions are sampled uniformly over the hemisphere, because the lobe is wide, and strongest at grazing
-//! angles. `E`, the directional albedo of a white lobe, is in a table. A roughness below 0.25 is replaced by
-//! 0.25, because `E` would exceed 1 at grazing angles.
+//! Directions are sampled uniformly over the hemisphere, because the lobe is wide. `E` is the directional
+//! albedo of a lobe with `colour = 1`; it is tabulated. A roughness below 0.25 is replaced by 0.25, because
+//! `E` would exceed 1 at grazing angles.
 
 use core::f32::consts::PI;
 
@@ -15,7 +15,7 @@ use glam::Vec3;
 use super::ggx_albedo::{SIDE, interpolated};
 use crate::vector::{about, max, max_component, unit};
 
-/// Minimum roughness. A smaller roughness would reflect more light than arrives at grazing angles.
+/// Minimum roughness. At a smaller one, more light than arrives would be reflected at grazing angles.
 const MIN_ROUGHNESS: f32 = 0.25;
 /// Density of sampled directions, 1/sr: uniform over the hemisphere.
 const DENSITY: f32 = 0.5 / PI;
@@ -30,7 +30,7 @@ pub(super) struct SheenLobe {
 }
 
 impl SheenLobe {
-    /// Creates the lobe for a roughness, 0 to 1, and an outgoing direction at `cosine` to the normal.
+    /// Creates a lobe with `roughness`, 0 to 1. `cosine` is the cosine between outgoing direction and normal.
     pub(super) fn new(colour: Vec3, roughness: f32, cosine: f32) -> Self {
         let roughness = max(roughness, MIN_ROUGHNESS);
         let of_white = interpolated(&ALBEDOS, roughness, cosine);
@@ -71,7 +71,7 @@ impl SheenLobe {
         DENSITY
     }
 
-    /// Ratio `f / p` divided by the albedo, dimensionless.
+    /// Ratio `f / (albedo p)`, dimensionless.
     pub(super) fn gain(&self, normal: Vec3, outgoing: Vec3, incident: Vec3) -> f32 {
         let white = Self { colour: Vec3::ONE, ..*self };
         let albedo = max(self.of_white, f32::MIN_POSITIVE);
@@ -85,14 +85,14 @@ impl SheenLobe {
     }
 }
 
-/// Fit `l` of the shadowing at a cosine to the normal.
+/// Value of the fit `l` at `cosine`, the cosine between a direction and the normal.
 fn shadowing(cosine: f32, alpha: f32) -> f32 {
     let fit = |cosine| logarithm(cosine, alpha);
     libm::expf(if cosine < 0.5 { fit(cosine) } else { 2.0 * fit(0.5) - fit(1.0 - cosine) })
 }
 
-/// Logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`. The coefficients are interpolated
-/// between those for `alpha` 0 and 1.
+/// Natural logarithm of `l` at a cosine `x` up to 0.5: `a / (1 + b x^c) + d x + e`. The five coefficients are
+/// interpolated between those for `alpha` 0 and 1.
 fn logarithm(x: f32, alpha: f32) -> f32 {
     const ROUGH: [f32; 5] = [21.5473, 3.829_87, 0.198_23, -1.977_6, -4.320_54];
     const SMOOTH: [f32; 5] = [25.3245, 3.324_35, 0.168_01, -1.273_93, -4.859_67];
@@ -104,8 +104,8 @@ fn logarithm(x: f32, alpha: f32) -> f32 {
     at(0) / (1.0 + at(1) * libm::powf(max(x, 0.0), at(2))) + at(3) * x + at(4)
 }
 
-/// Table of `E`, in steps of 1/255, by the midpoint rule over 512^2 directions. Rows are roughness 0 to 1,
-/// columns the square root of the cosine 0 to 1.
+/// Table of `E`, in units of 1/255, computed by the midpoint rule over 512^2 directions. Rows are for
+/// roughness 0 to 1, columns for the square root of the cosine, 0 to 1.
 const ALBEDOS: [[u8; SIDE]; SIDE] = [
     [255, 255, 255, 255, 76, 12, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [255, 255, 255, 255, 180, 81, 29, 8, 2, 0, 0, 0, 0, 0, 0, 0],

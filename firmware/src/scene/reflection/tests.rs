@@ -1,4 +1,4 @@
-//! Properties of every lobe: samples follow the density, weights are `f cos / p`, and the lobe is reciprocal.
+//! Tests of every lobe: samples follow the density, weights are `f cos / p`, and the lobe is reciprocal.
 
 use core::f32::consts::TAU;
 use std::{format, vec, vec::Vec};
@@ -26,7 +26,7 @@ fn ggx(roughness: f32, cosine: f32) -> Lobe {
     Lobe::Ggx(GgxLobe::new(Vec3::new(1.0, 0.5, 0.0), Vec3::ONE, roughness, cosine))
 }
 
-/// Lobes of every model, seen from near the normal, at 60 degrees and at a grazing angle.
+/// Lobes of every model, each with outgoing directions near the normal, at 60 degrees and at a grazing angle.
 fn reflectors() -> Vec<Reflector> {
     [0.95, 0.5, 0.15]
         .into_iter()
@@ -44,8 +44,8 @@ const ROWS: usize = 12;
 const COLUMNS: usize = 24;
 const CELLS: usize = ROWS * COLUMNS;
 
-/// Number of the cell, of equal solid angle, that contains a direction of the upper hemisphere; the last cell
-/// for directions below.
+/// Number of the cell that contains a direction. The upper hemisphere is divided into cells of equal solid
+/// angle; the last cell is for directions below.
 fn cell(direction: Vec3) -> usize {
     if direction.y < 0.0 {
         return CELLS;
@@ -159,8 +159,8 @@ fn a_lobe_loses_no_light_below_a_triangle_that_its_normal_is_not_of() {
     }
 }
 
-/// Compares the power that a lobe transports, weighted by a function of both directions, between samples for
-/// eye rays and samples for photons.
+/// Tests that a lobe transports the same power by samples for eye rays and by samples for photons. The power
+/// is weighted by a function of both directions.
 #[test]
 fn photons_of_a_lobe_transport_the_power_that_eye_rays_find() {
     let triangle = Vec3::Y;

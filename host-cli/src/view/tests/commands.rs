@@ -1,4 +1,4 @@
-//! Checks that the command line shown by a view parses to the settings of the settled picture.
+//! Checks that the command line shown by a view parses to the settings of the final picture.
 
 use clap::Parser;
 use photoncard_driver::choice::Choice;
@@ -95,7 +95,7 @@ fn options(random: &mut Random) -> Vec<String> {
     named
 }
 
-/// Wish of a view after random changes by a page.
+/// Request of a view with `options`, after random changes by a page.
 fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
     let mut wish = Wish::new(options.settings(), options.stated(), options.scene.assignments.clone());
     for _ in 0..random.below(6) {
@@ -139,8 +139,8 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         assert_eq!(settings.schedule.order, wish.settings.schedule.order, "{line}");
         assert_eq!(settings.schedule.tile, wish.settings.schedule.tile, "{line}");
         assert_eq!(settings.picture.layers, wish.settings.picture.layers, "{line}");
-        // The command line states every setting that a quality could choose. Without a number of caustic
-        // photons each program takes its own default.
+        // The command line states every setting that a quality could choose, except a number of caustic
+        // photons that is left to its default.
         assert_eq!(Stated { caustic_photons: true, ..render.stated() }, Stated::ALL, "{line}");
         assert_eq!(render.scene.assignments, wish.assignments(), "{line}");
         assert_eq!(render.scene.variant, view.scene.variant, "{line}");

@@ -1,5 +1,5 @@
-//! Random actions of pages and cards, in a simulated view. It is never stuck, holds bounded memory, and
-//! settles to the picture of the last wish.
+//! Tests of a simulated view with random actions of pages and cards. The view must never be stuck, must hold
+//! bounded memory, and must end with the picture of the last request.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ fn ten_thousand_random_actions_end_in_the_picture_of_the_last_wish() {
     assert!(world.firsts > 100, "{} pictures", world.firsts);
 }
 
-/// Wishes arrive faster than their pictures are rendered.
+/// Requests arrive faster than their pictures are rendered.
 #[test]
 fn a_moving_camera_is_shown_and_settles_once_it_rests() {
     for is_edit in [false, true] {

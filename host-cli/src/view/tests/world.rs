@@ -32,7 +32,7 @@ pub(super) struct ModelPage {
     pub(super) state: Option<Value>,
     pub(super) errors: u64,
     version: u32,
-    /// Number of wishes of which the page has received tiles.
+    /// Number of requests of which the page has received tiles.
     pub(super) versions: u64,
 }
 
@@ -49,10 +49,10 @@ pub(super) struct World {
     pub(super) pages: BTreeMap<PageNumber, ModelPage>,
     pub(super) now: Duration,
     pub(super) has_card: bool,
-    /// Gather rays beyond which the card refuses a pass.
+    /// Maximum number of gather rays; the card refuses a pass with more.
     pub(super) max_rays: u32,
     job: Option<Job>,
-    /// Wish whose photons are on the card.
+    /// Request whose photons are on the card.
     prepared: Option<Wish>,
     /// Number of completed first passes.
     pub(super) firsts: u64,
@@ -83,7 +83,7 @@ fn scene() -> Scene {
     })
 }
 
-/// `f32::to_bits` of the radiance of all pixels of a wish's picture: a hash of wish and `step`.
+/// `f32::to_bits` of the radiance of every pixel in the model picture: a hash of `wish` and `step`.
 fn bits(wish: &Wish, step: u32) -> u32 {
     let hasher = BuildHasherDefault::<DefaultHasher>::default();
     // Exponent bits that make any hash a positive normal number.
@@ -248,7 +248,7 @@ impl World {
         self.view.is_settled() && self.pages.values().all(is_shown)
     }
 
-    /// Checks that every page shows the settled picture of the newest wish.
+    /// Checks that every page shows the final picture of the newest request.
     pub(super) fn check_pictures(&self) {
         let wish = self.view.wish();
         let settled = bits(wish, 1);

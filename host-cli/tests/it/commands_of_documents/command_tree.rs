@@ -45,15 +45,16 @@ impl CommandTree {
         having.map(|(command, _)| command.as_str()).collect()
     }
 
-    /// Defect of arguments that the program refuses. It is run with a final `--help`, by which it only parses
-    /// them.
+    /// Returns a message if the program refuses these arguments. With a final `--help`, the program only
+    /// parses them.
     pub(crate) fn defect_of_arguments(&self, arguments: &[&str]) -> Option<String> {
         let outcome = self.room.run(&[arguments, &["--help"]].concat());
         let said = outcome.stderr.trim();
         (outcome.status != Some(0)).then(|| format!("`photoncard {}`: {said}", arguments.join(" ")))
     }
 
-    /// Defects of a line of a synopsis: a command with placeholders and, after two spaces, its description.
+    /// Defects of a line of a synopsis, which is a command with placeholders and, after two spaces, its
+    /// description.
     pub(crate) fn defects_of_synopsis(&self, line: &str) -> Vec<String> {
         let (form, description) = line.split_once("  ").unwrap_or((line, ""));
         let words: Vec<_> = form.split_whitespace().collect();
@@ -82,7 +83,8 @@ impl CommandTree {
         unknown.map(|option| format!("`photoncard {command}` has no {option}")).collect()
     }
 
-    /// Returns whether the first word of `form` behind a group of commands names none of them.
+    /// Returns whether `group` is a group of commands, and the word behind it in `form` names no command of
+    /// the group.
     fn lacks(&self, group: &str, form: &str) -> bool {
         let below = form[group.len()..].trim_start();
         let is_group = self.options.keys().any(|command| command.starts_with(&format!("{group} ")));

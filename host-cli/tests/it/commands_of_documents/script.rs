@@ -10,7 +10,7 @@ use crate::support::{Outcome, Room};
 
 const PRELUDE: &str = include_str!("prelude.sh");
 
-/// Programs that are not of this project and that commands of documents may run.
+/// Programs outside this project that commands of documents may run.
 const FOREIGN: [&str; 4] = ["cmp", "mkdir", "export", "python"];
 
 /// Runs a script in an empty folder with links to `scenes` and `tests`. Returns its messages if it fails.

@@ -88,8 +88,8 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
     assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
 }
 
-/// A view accepts 16 connections. A page that closes its connection is subtracted at once, before the view
-/// sends any message to the page.
+/// A view accepts 16 connections. A page that closes its connection frees its place at once, before the view
+/// sends it any message.
 #[test]
 fn pages_that_have_gone_free_their_places() {
     let room = Room::new();

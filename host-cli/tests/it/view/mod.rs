@@ -123,7 +123,7 @@ fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
     assert_eq!(shown.collect::<Vec<_>>(), denoised.pixels);
 }
 
-/// The work in the headers of a settled picture's tiles adds up to that of its command, also after several
+/// The work in the tile headers of the final picture adds up to that of the shown command, also after several
 /// passes.
 #[test]
 #[cfg(unix)]

@@ -44,7 +44,7 @@ impl View {
     /// Requests the WebSocket at `target`, with these headers `Host` and `Origin`.
     ///
     /// # Errors
-    /// HTTP status of the refusal.
+    /// Returns the HTTP status of the refusal.
     pub(crate) fn try_connect(&self, target: &str, host: &str, origin: Option<&str>) -> Result<Page, u16> {
         let stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -99,12 +99,13 @@ pub(crate) struct Page {
     received: usize,
     /// Last text message of each type.
     pub(crate) last: HashMap<String, Value>,
-    /// Radiance or layer of each pixel as it is shown.
+    /// Values of each pixel as shown: radiance or a layer.
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
-    /// Of each tile received: number of the wish, and side of the square that a rendered pixel covers.
+    /// Number of the request, and side of the square that a rendered pixel covers, pixels, for each tile
+    /// received.
     pub(crate) steps: Vec<(u32, u32)>,
-    /// By the corner of each tile of the newest wish at full resolution: gathers, irradiance records, DRAM
-    /// lines.
+    /// Gathers, irradiance records and DRAM lines of the tiles of the newest picture at full resolution, by
+    /// each tile's corner.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 
@@ -154,7 +155,8 @@ impl Page {
         self.wait(kind, |_| true)
     }
 
-    /// Waits for a settled picture, of a newer wish if the last state is settled already. Returns its state.
+    /// Waits for a final picture, and returns its state. If the last state is `settled`, waits for a newer
+    /// request's.
     pub(crate) fn settle(&mut self) -> Value {
         let before = self
             .last

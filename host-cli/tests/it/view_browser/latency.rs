@@ -62,8 +62,8 @@ fn start(room: &Room, file: &str, size: &str) -> View {
     View::start(room, &shipped(file), &["--size", size])
 }
 
-/// Opens a tab and waits until tiles of the settled picture arrive: its settings are chosen, and its photons
-/// traced.
+/// Opens a tab and waits until tiles of the final picture arrive: its settings are then chosen, and its
+/// photons traced.
 fn refined(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = shown(browser, view);
     tab.wait("photoncard.state.settled || photoncard.picture.samples === photoncard.state.spp", LIMIT);
@@ -80,7 +80,8 @@ fn opened(browser: &mut Browser, file: &str) -> f64 {
     first.as_f64().unwrap() - started
 }
 
-/// Median times from a camera move to each of `parts` of the picture, milliseconds.
+/// Median times from a camera move to each of `parts`, the page's names of stages of the picture,
+/// milliseconds.
 fn moved<const N: usize>(
     browser: &mut Browser,
     room: &Room,
@@ -109,7 +110,7 @@ fn moved<const N: usize>(
     times.map(median)
 }
 
-/// Complete pictures per second, in the last of four seconds in which the camera turns.
+/// Median number of complete pictures per second while the camera turns, read each half second from 2 to 6 s.
 fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "256x256");
     let mut tab = refined(browser, &view);

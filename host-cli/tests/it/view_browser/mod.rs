@@ -44,7 +44,7 @@ const WITHOUT_WEBGL2: &str = "const get = HTMLCanvasElement.prototype.getContext
 /// Time limit of each wait, long enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(150);
 
-/// Opens the page of a new view, and waits for its settled picture.
+/// Opens the page of a new view, and waits for its final picture.
 fn opened(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab(WINDOW);
     tab.open(&view.address);

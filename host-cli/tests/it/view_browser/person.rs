@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 use super::browser::Tab;
 use crate::support::shipped;
 
-/// JavaScript expression that is true once the page shows the settled picture with all changes.
+/// JavaScript expression that is true once the page shows the final picture with all changes.
 pub(crate) const SETTLED: &str = "window.photoncard?.isSettled";
 
 const LIMIT: Duration = Duration::from_secs(30);
 
 pub(crate) trait Person {
-    /// Selects the entry with a value in the list with an id.
+    /// Selects the entry `value` of the list with the id `list`.
     fn choose(&mut self, list: &str, value: &str);
     /// Sets the exposure in stops; `None` is automatic.
     fn expose(&mut self, stops: Option<f64>);
@@ -22,7 +22,7 @@ pub(crate) trait Person {
     fn drag(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]);
     /// Rectangle `[x, y, width, height]` of the picture on the screen, pixels.
     fn picture(&mut self) -> [f64; 4];
-    /// Hides the panel: the picture has one pixel for each of the window's.
+    /// Hides the panel, and gives the picture one pixel for each pixel of the window.
     fn fill_window(&mut self);
     /// Toggles the switch of a light.
     fn switch(&mut self, light: &str);
@@ -30,7 +30,7 @@ pub(crate) trait Person {
     fn labels(&mut self, material: &str) -> Vec<String>;
     /// Sets the field of a material that has this label; a switch is toggled.
     fn set_material(&mut self, material: &str, label: &str, value: f64);
-    /// Presses the button by which a page takes over the steering.
+    /// Presses the button by which a page takes over the control of the view (steers).
     fn take_over(&mut self);
     /// Saves the picture. Returns the command line that the page shows.
     fn save(&mut self, name: &str, ending: &str) -> String;

@@ -15,7 +15,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Starts the command on a free port, with the folder `out` of the room.
+    /// Starts the command on a free port. Pages save pictures in the folder `out` of `room`.
     pub(crate) fn start(room: &Room, scene: &str, options: &[&str]) -> Self {
         std::fs::create_dir_all(room.path("out")).unwrap();
         let mut command = room.command();

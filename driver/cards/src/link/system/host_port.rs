@@ -21,7 +21,7 @@ pub struct HostPort {
     listener: Listener,
     stop: Arc<AtomicBool>,
     host: Option<Host>,
-    /// Second host that has connected. It is refused once the present host is known to be connected.
+    /// Second host that has connected. It is refused once the present host is known to be still connected.
     next: Option<Box<dyn Port + Send>>,
     /// Time of the last poll of the host and of the listener.
     looked: Instant,

@@ -62,7 +62,7 @@ impl FromStr for ListenAddress {
     }
 }
 
-/// Accepts connections of hosts to a card. Dropping it removes the file of a Unix socket.
+/// Accepts connections of hosts to a card. Dropping the listener removes the file of a Unix socket.
 pub struct Listener {
     kind: Kind,
     card_address: String,

@@ -45,8 +45,8 @@ impl RemoteAddress {
         Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
     }
 
-    /// Parses an address. `kind` is the text before the first colon, and `rest` the text after it. `None` if
-    /// there is no such kind of link.
+    /// Parses an address. `kind` is the text before the first colon, and `rest` the text after it. Returns
+    /// `None` if there is no such kind of link.
     ///
     /// # Errors
     /// A sentence that names the valid form.

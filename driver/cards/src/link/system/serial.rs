@@ -19,10 +19,11 @@ use serialport::TTYPort as SystemPort;
 
 /// Duration of silence after which a line holds no stale bytes.
 const QUIET: Duration = Duration::from_millis(50);
-/// Maximum time for which all bytes of a card that does not fall silent are dropped. After that time, only
-/// the bytes up to the next end of a frame are dropped.
+/// Time for which all bytes are dropped if the card does not fall silent. After that time, only the bytes up
+/// to the next end of a frame are dropped.
 const STALE: Duration = Duration::from_secs(1);
-/// Inverse of the maximum relative error of the bit rate, 2 %. A UART character of ten bits tolerates more.
+/// Inverse of the maximum relative error of the bit rate: 50 for 2 %. A UART character of ten bits tolerates
+/// more.
 const SPEED_TOLERANCE: u32 = 50;
 /// Minimum timeout. Windows interprets 0 as infinite.
 const MIN_WAIT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };

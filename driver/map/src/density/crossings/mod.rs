@@ -1,9 +1,9 @@
 //! Crossings of chords with triangles, and whether they lie outside all solids.
 //!
-//! All crossings of a chord count, not only the first, except crossings inside a solid, and unlit crossings
-//! below others ([`super::evidence`]). The *depth* of a point is the number of solids that contain it. It
-//! follows from the front and back faces crossed on a path from a reference point outside all solids, a
-//! little above the photon.
+//! Every crossing of a chord counts as surface area, with two exceptions: crossings inside a solid, and unlit
+//! crossings below another crossing ([`super::evidence`]). The *depth* of a point is the number of solids
+//! that contain it. It follows from the front and back faces crossed on a path from a reference point outside
+//! all solids, a little above the photon.
 
 use std::cmp::Reverse;
 
@@ -39,7 +39,8 @@ fn key(height: f32, is_front: bool) -> u32 {
     ascending.wrapping_sub(LOWEST) << 1 | u32::from(is_front)
 }
 
-/// Least value of `ascending` in [`key`] for heights above -2. Its subtraction leaves a bit for the face.
+/// Least value of `ascending` in [`key`] for heights above -2. Subtracting it frees the top bit, and a shift
+/// then makes room for the bit of the face.
 const LOWEST: u32 = 1 << 30;
 
 /// Height of a crossing, decoded from its sort key.
@@ -49,9 +50,10 @@ fn height(key: u32) -> f32 {
     f32::from_bits(if ascending >> 31 == 0 { !ascending } else { ascending & !(1 << 31) })
 }
 
-/// Encodes the side of a triangle that a downward chord hits. Bits 0 to 7 are the code of the side's normal;
-/// bit 8 is set if no photons are stored there; bits 9 and 10 are 1 plus the change of the number of solids
-/// that contain the chord's point.
+/// Encodes the side of a triangle that a downward chord hits:
+/// - bits 0 to 7: code of the side's normal;
+/// - bit 8: set if no photons are stored there;
+/// - bits 9 and 10: 1 plus the change of the chord's depth (number of solids around its point).
 #[inline(always)]
 fn face(sides: Sides, is_front: bool) -> u32 {
     let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
@@ -124,14 +126,13 @@ impl Crossings {
         self.height = height;
     }
 
-    /// Sets the depth of a chord: the number of solids that contain its point at the height of the reference
-    /// point, minus the number that contain the reference point.
+    /// Sets the entry of `Self::depths` for one chord.
     pub(super) fn set_depth(&mut self, chord: usize, depth: i32) {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings outside all solids: in `surfaces`, those with no other crossing of their chord
-    /// above them, and in `covered`, all others.
+    /// Collects the crossings outside all solids. `surfaces` receives each crossing that is the highest of
+    /// its chord, `covered` all others.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -185,7 +186,8 @@ impl Level {
     }
 }
 
-/// Sorts layers into levels. Crossings with equal keys keep their order.
+/// Sorts the crossings of each chord into levels, the highest first. Crossings with equal keys keep the order
+/// of their layers.
 #[inline(always)]
 fn sort(isa: impl Isa, layers: &[Layer], levels: &mut Vec<Level>) {
     levels.clear();

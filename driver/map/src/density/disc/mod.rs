@@ -1,16 +1,16 @@
 //! Disc fractions: the boundary correction of the density estimate.
 //!
-//! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of
-//! all surfaces in the sphere, of which it counts those with a similar normal. Near an edge or in a corner
-//! these surfaces have less area than the disc, and the estimate would be too dark: on a Cornell box by some
-//! 2 % of all indirect light. On steps or between balusters they can have more area, and the estimate would
-//! be too bright. This module measures the area once per photon, with the radius of a gather at the photon,
-//! along chords of the sphere ([`super::chords`]). A gather then divides by this area
+//! A gather, the density estimate at a point, divides by the area of a flat disc. Its search covers a sphere,
+//! however, and counts the photons with a similar normal on all surfaces in the sphere. Near an edge or in a
+//! corner these surfaces have less area than the disc, and the estimate would be too dark: on a Cornell box
+//! by some 2 % of all indirect light. On steps or between balusters they can have more area, and the estimate
+//! would be too bright. This module measures the area once per photon, with the radius of a gather at the
+//! photon, along chords of the sphere ([`super::chords`]). A gather then divides by this area
 //! ([`photoncard_firmware::photon`]).
 //!
-//! Most photons lie inside a large flat surface and have the fraction 1. Leaves with only such photons are
-//! recognized by the triangles around them. The photons of any other leaf share the search for the radius,
-//! the query for triangles, and the chords.
+//! Most photons lie inside a large flat surface and have the fraction 1. Leaves of the photon map with only
+//! such photons are recognized by the triangles around them. The photons of any other leaf share the search
+//! for the radius, the query for triangles, and the chords.
 
 use glam::Vec3;
 use photoncard_firmware::photon::{MIN_NORMAL_COSINE, VisibleRegion};
@@ -38,34 +38,37 @@ use crate::photon::PhotonError;
 const LEAVES_PER_TASK: usize = 64;
 /// Minimum cosine between the normals of photons that share chords.
 const MIN_SHARED_COSINE: f32 = 0.85;
-/// Height of the reference point above a photon, in radii of a gather, if no surface is nearer.
+/// Height of the reference point (`ChordFrame::open`) above a photon, in radii of a gather, if no surface
+/// is nearer.
 const OPEN_HEIGHT: f32 = 0.1;
 /// Radius of the sphere in which a gather looks for hidden surfaces, divided by the radius of a gather at the
 /// photon. It exceeds 1 because the point of a gather lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Maximum difference between the hidden fraction of the surface area and that of the photons' power, within
-/// [`MARGIN`] radii of a gather, at which the gather uses all photons instead of those in its visible region.
+/// Maximum difference between two hidden fractions within [`MARGIN`] radii of a gather: the fraction of the
+/// surface area and the fraction of the photons' power that the measured photon cannot see. Above it, the
+/// gather uses only the photons in its visible region.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Maximum difference between the hidden fraction of the surface area and that of the photons' power around a
-/// group of photons, times the ratio of the group's disc area to a photon's. If the product is not greater,
-/// the photons of the group have the fractions of their whole discs.
+/// Maximum difference between the two hidden fractions around a group of photons, times the ratio of the
+/// group's disc area to a photon's. Up to this product, all photons of the group have the fractions of their
+/// whole discs.
 const NEAR_DIFFERENCE: f32 = 0.03;
-/// Ratio of the estimated radius of a leaf's gathers of k photons to `d sqrt(k / n)`, for n photons of the
-/// leaf within the distance d of the middle one.
+/// Factor of the estimated gather radius `BY_SPREAD d sqrt(k / n)` at a leaf, for gathers of k photons. The
+/// leaf has n photons within the distance d of its middle photon.
 const BY_SPREAD: f32 = 1.2;
-/// Maximum distance at which a photon shows that a surface is lit, divided by the radius of a gather.
+/// Maximum distance at which a photon is evidence that a surface is lit ([`super::evidence`]), divided by the
+/// radius of a gather.
 const EVIDENT: f32 = 0.7;
 /// Distance behind a hit at which a ray continues, in radii of the ball.
 const STEP: f32 = 1e-5;
 
-/// Disc fraction of a photon, of its whole disc or of the region that it sees.
+/// Disc fraction of a photon. It refers to the whole disc or only to the region that the photon sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Fraction {
     fraction: f32,
     is_of_region: bool,
 }
 
-/// Disc fraction of a photon on a plain wall.
+/// Disc fraction of a photon inside a large flat surface.
 const WHOLE: Fraction = Fraction { fraction: 1.0, is_of_region: false };
 
 /// Encoded disc fractions of a leaf's photons.
@@ -185,8 +188,8 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Measures the leaves `first..end`. Returns the index and the encoded fractions of each leaf with a
-    /// fraction other than 1.
+    /// Measures the disc fractions in the leaves `first..end`. Returns the index and the encoded fractions of
+    /// each leaf that has a fraction other than 1.
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
@@ -225,8 +228,8 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// Returns whether the gathers at a leaf's photons have at most the usual radius. Their radius is
-    /// estimated from the density of these photons.
+    /// Returns whether gathers at the photons of a leaf have at most the radius `Self::usual`. The radius
+    /// is estimated from the density of these photons.
     fn are_usual(&self, photons: &[DiscPhoton]) -> bool {
         let share = self.searcher.neighbors() as f32 / photons.len() as f32;
         let spread = middle(photons).map_or(0.0, |middle| spread(photons, middle));
@@ -250,8 +253,8 @@ impl<'a> Meter<'a> {
         self.surroundings.is_plain(scene, *memory, self.sides, ball, wall)
     }
 
-    /// Measures the disc fractions of a cluster: photons within `radius`, the radius of their gathers, of the
-    /// photon `middle`.
+    /// Measures the disc fractions of a cluster of photons. `radius` is the radius of their gathers, metres;
+    /// all of them lie within this distance of the photon `middle`.
     fn measure_cluster(
         &mut self,
         mut photons: DiscPhotons,
@@ -327,8 +330,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Measures the areas of the surfaces around a photon that its gathers count, and of the part of them
-    /// that the photon sees, within two radii (metres).
+    /// Measures, within two radii (metres) of a photon, the area of the surfaces that its gathers count and
+    /// the area of the part that the photon sees.
     fn seen(
         &self,
         surfaces: &OpenSurfaces,
@@ -345,8 +348,9 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds to [`Self::surfaces`] the covered crossings that photons show to be lit ([`super::evidence`]),
-    /// unless the gap to the crossing above is within the error of the photon grid.
+    /// Adds to [`Self::surfaces`] each crossing in `Self::covered` that is near enough to a photon to be
+    /// lit ([`super::evidence`]). A crossing is skipped if the gap to the crossing above is within the error
+    /// of the photon grid.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
@@ -374,8 +378,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Returns whether the hidden fractions of the surface area and of the photons' power may differ for the
-    /// photons of a group. Only the first photon of the group is examined.
+    /// Returns whether the photons of a group may need the fractions of their visible regions. They may if
+    /// the two hidden fractions around the first photon differ too much (`NEAR_DIFFERENCE`).
     fn may_differ(
         &mut self,
         group: &[DiscPhoton],
@@ -419,7 +423,7 @@ impl<'a> Meter<'a> {
         })
     }
 
-    /// Removes the crossings at cut-outs of triangles.
+    /// Removes the crossings at points that a triangle's texture cuts out.
     fn leave_out_cut_outs(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         let Self { sides, searcher: Searcher { scene, memory, .. }, crossings, .. } = self;
         let [tangent, bitangent, normal] = frame.axes;
@@ -441,8 +445,8 @@ impl<'a> Meter<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Coordinate frame along the normal of a photon. The reference point is above the photon, with no
-    /// surface in between: at [`OPEN_HEIGHT`], or halfway to the nearest surface above.
+    /// Coordinate frame along the normal of a photon. Its reference point lies above the photon: at
+    /// [`OPEN_HEIGHT`] or halfway to the nearest surface above, whichever is lower.
     fn frame(&self, photon: &DiscPhoton, cluster: &Cluster) -> Result<ChordFrame, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let normal = self.exact_normal(photon, radius)?;
@@ -471,8 +475,8 @@ impl<'a> Meter<'a> {
         1e-3 * radius + self.searcher.scene.header.photon_grid.cell
     }
 
-    /// Nearest surface from `origin` along a unit vector: its distance, and its normal on the side of
-    /// `origin`.
+    /// Finds the nearest surface from `origin` along a unit vector. Returns its distance, metres, and its
+    /// normal, which faces the origin.
     fn first_on_way(
         &self,
         origin: Vec3,
@@ -489,8 +493,8 @@ impl<'a> Meter<'a> {
         }))
     }
 
-    /// Collects the crossings by rays through the scene. [`Surroundings::cross`] does the same from a list of
-    /// triangles, which must be complete.
+    /// Collects the crossings of chords by rays through the whole scene, for a ball without a complete list
+    /// of triangles.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
         let Searcher { scene, memory, .. } = &self.searcher;
@@ -524,9 +528,9 @@ impl<'a> Meter<'a> {
 }
 
 impl Fraction {
-    /// Chooses the disc fraction of a photon: that of its whole disc or, if the hidden fractions of the
-    /// surface area and of the photons' power differ by more than [`MAX_DIFFERENCE`] plus 1.5 standard
-    /// deviations, that of its visible region.
+    /// Chooses the disc fraction of a photon. It is that of the visible region if the hidden fractions of
+    /// area and power differ by more than [`MAX_DIFFERENCE`] plus 1.5 standard deviations, else that of the
+    /// whole disc.
     fn new(areas: &Areas, powers: &Areas) -> Self {
         let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
         let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();
@@ -544,7 +548,7 @@ fn nearest(photons: &[DiscPhoton], to: Vec3) -> Option<DiscPhoton> {
     photons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
 }
 
-/// Distance of the photon that is farthest from `middle`, metres.
+/// Greatest distance of a photon from `middle`, metres.
 fn spread(photons: &[DiscPhoton], middle: DiscPhoton) -> f32 {
     photons.iter().map(|photon| photon.position.distance(middle.position)).fold(0.0, f32::max)
 }

@@ -1,4 +1,4 @@
-//! Properties of disc fractions: rays and the list of triangles give equal results.
+//! Tests that disc fractions measured by rays and by the list of triangles agree.
 
 use photoncard_scene::gltf;
 

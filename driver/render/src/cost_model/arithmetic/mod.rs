@@ -1,10 +1,11 @@
-//! Counts the arithmetic of a frame: the number of steps of each unit of the chip, times the floating-point
-//! operations per step.
+//! Counts the arithmetic of a frame: the number of executions of each step, times the floating-point
+//! operations per execution.
 //!
-//! The number of each [`Step`] follows from counters and the contents of the lines that a chip reads. The
-//! operations per step are constants of the firmware ([`OPERATIONS`]). They were counted on a target without
-//! floating-point instructions, where each operation is a function call (`tests/operations.sh`);
-//! `tests/tests/it/operations.rs` counts them again. A vector lane counts only if its result is used.
+//! The number of executions of each [`Step`] follows from the counters of a chip and the contents of the
+//! lines that it reads. The operations per execution are constants of the firmware ([`OPERATIONS`]). They
+//! were counted on a target without floating-point instructions, where each operation is a function call
+//! (`tests/operations.sh`); `tests/tests/it/operations.rs` counts them again. A vector lane counts only if
+//! its result is used.
 
 mod step;
 mod table;
@@ -22,7 +23,7 @@ pub const UNITS: usize = Unit::ALL.len();
 pub struct Arithmetic(pub [Operations; UNITS]);
 
 impl Arithmetic {
-    /// Operations of the work `work`: the sum over all steps of their number times the operations per step.
+    /// Operations of `work`: for each step, the number of executions times the operations per execution.
     pub fn of(work: &Work) -> Self {
         let mut arithmetic = Self::default();
         for (step, operations) in Step::ALL.iter().zip(OPERATIONS) {
@@ -65,8 +66,9 @@ mod tests {
 
     #[test]
     fn a_box_costs_the_operations_of_its_slab_test() {
-        // A product and a sum for each of six planes. Seven comparisons: near is the greatest of three planes
-        // and 0, far the least of three planes and the limit, and near is compared with far.
+        // Slab test: a product and a sum for each of six planes, and seven comparisons. `near` is the maximum
+        // of three planes and 0, `far` the minimum of three planes and the limit, and `near` is compared with
+        // `far`.
         let boxes = Contents { boxes: 1, ..Contents::ZERO };
         let work = Work::new(&Counters::ZERO, &boxes, 100.0);
         let traversal = *Arithmetic::of(&work).unit(Unit::Traversal);

@@ -1,4 +1,4 @@
-//! Units of a chip, the steps that they perform, and numbers of operations by kind.
+//! Units of a chip, the steps that they execute, and numbers of operations by kind.
 
 use photoncard_picture::choice::choices;
 use photoncard_shared::counters::Counters;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::emulator::contents::Contents;
 
-/// Unit of a chip, by the kind of its arithmetic.
+/// Unit of a chip that does one kind of arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Intersection of rays with boxes.
@@ -17,7 +17,7 @@ pub enum Unit {
     Search,
     /// Selection of the k nearest candidates of a search.
     Selection,
-    /// Density estimate, and reflection of photons.
+    /// Density estimate, and reflection of the light of photons.
     Reflection,
     /// Evaluation of surfaces at the ends of rays.
     Shading,
@@ -44,7 +44,7 @@ choices!(Unit {
     Pixels = "pixels": "Eye rays and pixels",
 });
 
-/// Part of a chip in the cost model of Table 7.1.
+/// Unit of the chip in the cost model of Table 7.1, which combines several `Unit`s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipPart {
     /// Casts rays and evaluates the surfaces at their ends.
@@ -71,7 +71,7 @@ impl Unit {
 pub enum Step {
     /// Preparation of a ray for the tests of boxes and triangles.
     Ray,
-    /// Computation that all boxes of a hierarchy node share.
+    /// Computation that is done once for all boxes of a hierarchy node.
     Node,
     /// Test of one box of a node.
     Box,
@@ -79,7 +79,7 @@ pub enum Step {
     Vertex,
     /// Edge functions of one triangle of a leaf, whether or not they exclude it.
     Triangle,
-    /// Intersection of those triangles of a leaf that their edge functions do not exclude.
+    /// Intersection with the triangles of a leaf that their edge functions do not exclude.
     Leaf,
     /// Distance to one box of photons.
     PhotonBox,
@@ -87,11 +87,12 @@ pub enum Step {
     Photon,
     /// Distance to one photon of the kd-tree.
     TreePhoton,
-    /// Guess of the interval that has the k-th smallest distance, per candidate that a selection reads.
+    /// Guess of the interval that contains the k-th smallest distance. Its work is divided evenly among the
+    /// candidates that a selection reads.
     Selected,
     /// Comparison of two distances.
     Compared,
-    /// Density estimate of a gather for radiance, or lookup of an irradiance point, without the search.
+    /// Density estimate of radiance by a gather, or use of an irradiance point, without the search.
     Gather,
     /// Decoding of a photon's normal.
     Normal,
@@ -207,8 +208,8 @@ impl Step {
             Self::Photon => contents.photons,
             Self::TreePhoton => contents.tree_photons,
             Self::Selected => counters.photons_selected,
-            // The distance of a photon of a leaf is compared with the limit by its bits, which `Self::Photon`
-            // does not count; `Self::TreePhoton` counts its comparison.
+            // `Self::Photon` does not include the comparison of its distance with the limit, which compares
+            // bits. `Self::TreePhoton` includes its comparison.
             Self::Compared => counters.distances_compared + contents.photons,
             Self::Gather => counters.gathers - counters.tables + counters.caustic_gathers + counters.lookups,
             Self::Normal => counters.normals_decoded,
@@ -230,8 +231,8 @@ impl Step {
     }
 }
 
-/// Estimates the number of photons found by searches for direction tables. Each is assumed to find as many as
-/// the mean search of all kinds.
+/// Estimates the number of photons found by searches for direction tables, as if each found the mean number
+/// of all searches.
 fn photons_of_tables(counters: &Counters) -> f64 {
     counters.photons_found as f64 * counters.tables as f64 / counters.gathers.max(1) as f64
 }

@@ -1,12 +1,12 @@
-//! Timing model of a chip whose reads have latency: three units, the queue of gathers between two of them,
-//! and the DRAM that they share.
+//! Timing model of a chip in which reads have latency. It has three units, the queue of gathers between two
+//! of them, and the DRAM that they share.
 //!
-//! A task (a ray or a gather) is a chain of steps; a step is a read of a line and the arithmetic on it. Each
-//! unit has as many tasks in flight as the [`Machine`] states, each at one step. A read that misses the cache
-//! waits for the DRAM's bus, then for its latency; arithmetic waits for the unit. Both are served in the
-//! order of arrival. A ray passes from the ray caster to the controller. If it hits, its gather enters the
-//! queue, where a place was reserved when the ray began. A [`Policy`] determines when the queue is drained.
-//! Rows and banks of a DRAM are left to DRAM simulators (`tests/peers/dram.sh`).
+//! A task is a ray or a gather. It is a chain of steps: each reads a line and does the arithmetic on it. A
+//! unit has up to as many tasks in flight as the [`Machine`] states. A read that misses the cache waits for
+//! the bus of the DRAM, then for the latency; arithmetic waits for the unit. Bus and unit serve requests in
+//! the order of arrival. A ray passes from the ray caster to the controller. If it hits, its gather enters
+//! the queue, in which an entry was reserved when the ray began. A [`Policy`] determines when the queue is
+//! drained. Rows and banks of the DRAM are not modelled; DRAM simulators do that (`tests/peers/dram.sh`).
 
 mod quantities;
 mod simulation;
@@ -20,15 +20,15 @@ use super::{Cost, Machine};
 /// Policy that determines whether a chip casts rays while its queue is drained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Policy {
-    /// No rays are cast while the queue is drained. Each unit has all of the chip's arithmetic while it
-    /// works.
+    /// No rays are cast while the queue is drained. The unit that works has all of the arithmetic of the
+    /// chip.
     Alternate,
-    /// The ray caster fills one half of the queue while the gather unit drains the other, each with its share
-    /// of the arithmetic. A queue of one entry has no halves: it is filled and drained in turn.
+    /// The ray caster fills one half of the queue while the gather unit drains the other half. Each unit has
+    /// its share of the arithmetic. A queue of one entry has no halves: it is filled and drained in turn.
     Overlapped(Shares),
 }
 
-/// Fractions of the chip's arithmetic that its units have.
+/// Fraction of the arithmetic rate of the chip that each unit has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
     /// Fraction of the chip's arithmetic that the ray caster has, 0 to 1.
@@ -40,7 +40,7 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// Shares in proportion to a cost's arithmetic; equal shares if the cost has no arithmetic.
+    /// Shares in proportion to each unit's arithmetic in a cost; equal shares if the cost has none.
     pub fn of(cost: &Cost) -> Self {
         let total = cost.total().flops;
         let share = |flops: f64| if total > 0.0 { flops / total } else { 1.0 / 3.0 };
@@ -57,13 +57,13 @@ impl Shares {
 pub struct TimedChip {
     /// DRAM, arithmetic and tasks in flight.
     pub machine: Machine,
-    /// Number of entries of the queue of gathers, at least 1, in both halves together.
+    /// Number of entries of the queue of gathers: that of both halves together, at least 1.
     pub queue: u64,
     /// Policy by which the queue is drained.
     pub policy: Policy,
 }
 
-/// Work of a frame by unit, which determines the frame's time.
+/// Work of a frame in each unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameLoad {
     /// Rays in the ray caster, and their reads of the scene.
@@ -74,14 +74,14 @@ pub struct FrameLoad {
     pub gathers: Load,
 }
 
-/// Minimum number of drains that are simulated. A frame's time is linear in its number of drains from the
-/// first drain on.
+/// Minimum number of simulated drains of the queue. From the first drain on, the time of a frame is linear in
+/// its number of drains.
 const MIN_DRAINS: f64 = 4.0;
-/// Approximate number of steps that are simulated. The number of simulated drains follows from it, but is at
-/// least [`MIN_DRAINS`].
+/// Approximate number of simulated steps. It determines the number of simulated drains, which is at least
+/// [`MIN_DRAINS`].
 const STEPS: f64 = 65_536.0;
-/// Maximum number of entries of a simulated queue. The fraction of time that a longer queue would save is
-/// below the number of tasks in flight divided by the number of entries.
+/// Maximum number of entries of the simulated queue. A longer queue would save less than the fraction
+/// `tasks in flight / entries` of the time.
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {
@@ -92,10 +92,10 @@ impl FrameLoad {
         (bytes / machine.bandwidth).max(flops / machine.flops)
     }
 
-    /// Times of the frame on a chip that fetches lines of `line_bytes` bytes from DRAM. A sample of the
-    /// drains is simulated. Each remaining drain takes the mean time of the sample's second half.
+    /// Times of the frame on a chip that fetches lines of `line_bytes` bytes from DRAM. Only some drains are
+    /// simulated. Each further drain takes the mean time of the second half of these.
     pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
-        // Pieces of the rays' work, each of which leads to at most one gather.
+        // Number of pieces into which the work of the rays is divided. Each leads to at most one gather.
         let pieces = self.rays.tasks.max(self.gathers.tasks);
         if pieces < 1.0 {
             return FrameTimes::default();

@@ -1,6 +1,6 @@
 //! Work of a unit, and times of units and of a frame.
 
-/// Equal tasks of a frame in one unit.
+/// Work of a frame in one unit, divided equally among its tasks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     /// Number of tasks (rays or gathers).
@@ -13,14 +13,14 @@ pub struct Load {
     pub flops: f64,
 }
 
-/// Times of a unit in a frame, seconds. In the remaining time it waits for other units, or has finished.
+/// Times of a unit, seconds. In the rest of the frame the unit waits for other units, or has finished.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UnitTimes {
     /// Time of arithmetic.
     pub busy: f64,
     /// Time in which all tasks in flight wait for reads.
     pub memory: f64,
-    /// Time in which the ray caster waits for places in the queue, or the gather unit for gathers.
+    /// Time in which the ray caster waits for free queue entries, or the gather unit for gathers.
     pub queue: f64,
 }
 
@@ -42,7 +42,7 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
-    /// Extrapolates linearly: these times plus `factor` times the difference to `later`.
+    /// Extrapolates linearly: returns `self + factor * (later - self)`.
     pub(super) fn extrapolated(&self, later: &Self, factor: f64) -> Self {
         let time = |of: fn(&Self) -> f64| of(self) + (of(later) - of(self)) * factor;
         let unit = |of: fn(&Self) -> &UnitTimes| {

@@ -9,12 +9,12 @@ use super::quantities::{FrameTimes, Load, UnitTimes};
 
 /// Number of ticks of the simulation per second.
 const TICKS: f64 = 1e14;
-/// Maximum number of steps of a task. A task with more is simulated with this number, and each step has the
-/// arithmetic, bus time and latencies of several. The sums of its waits and of its use of each resource do
-/// not change.
+/// Maximum number of simulated steps of a task. If a task has more, each simulated step has the arithmetic,
+/// bus time and latencies of several. The total times of its waits and of its use of each resource do not
+/// change.
 const MAX_STEPS: f64 = 4.0;
 
-/// Sequence of integers whose mean is a real number, distributed as evenly as possible.
+/// Sequence of integers with a given real mean, as even as possible.
 #[derive(Clone, Copy)]
 pub(super) struct Spread {
     each: u64,
@@ -41,7 +41,7 @@ impl Spread {
     }
 }
 
-/// Steps of the tasks of a unit; times in ticks.
+/// Number and duration of the steps of the tasks of a unit; times in ticks.
 #[derive(Clone, Copy)]
 pub(super) struct Task {
     /// Number of steps of a task.
@@ -70,7 +70,7 @@ fn ratio(amount: f64, by: f64) -> f64 {
 }
 
 impl Task {
-    /// Tasks of a load, in a unit with the fraction `share` of the machine's arithmetic.
+    /// Tasks of a load in a unit that has the fraction `share` of the arithmetic of the machine.
     pub(super) fn new(load: &Load, machine: &Machine, share: f64, line_bytes: f64) -> Self {
         let tasks = load.tasks.max(1.0);
         let requests = load.requests.max(tasks);
@@ -107,12 +107,12 @@ impl Plan {
         self.is_shared || self.queue < 2
     }
 
-    /// Number of entries at the beginning of a drain.
+    /// Number of filled queue entries at which a drain begins.
     pub(super) fn entries(&self) -> u64 {
         if self.alternates() { self.queue } else { self.queue / 2 }
     }
 
-    /// Number of queue entries that rays may fill or reserve.
+    /// Number of queue entries that rays may fill or reserve, while the queue is drained or not.
     fn room(&self, is_draining: bool) -> u64 {
         match (self.alternates(), is_draining) {
             (true, true) => 0,
@@ -130,7 +130,7 @@ struct Server {
 }
 
 impl Server {
-    /// Serves a request that takes `time` ticks. Returns the end of the service. A request of 0 ticks does
+    /// Serves a request that takes `time` ticks. Returns the time at which it ends. A request of 0 ticks does
     /// not wait.
     fn serve(&mut self, now: u64, time: u64) -> u64 {
         if time == 0 {
@@ -149,7 +149,7 @@ enum Unit {
     GatherUnit,
 }
 
-/// End of a task's wait.
+/// Event at which a task continues.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Event {
     /// The data have arrived. The number counts the remaining steps, including this one.
@@ -160,12 +160,12 @@ enum Event {
     Controlled,
 }
 
-/// Tasks of a unit, and the times in which none of them computes.
+/// Numbers of tasks of a unit in each state, and the times in which the unit computes or waits.
 struct UnitState {
     task: Task,
     busy: u64,
-    /// Number of tasks that wait for reads. `computing` is the number of those that compute or wait for
-    /// arithmetic.
+    /// Number of tasks that wait for reads. `computing` is the number of tasks that compute or wait for the
+    /// arithmetic unit.
     reading: u64,
     computing: u64,
     memory_wait: u64,
@@ -177,7 +177,7 @@ impl UnitState {
         Self { task, busy: 0, reading: 0, computing: 0, memory_wait: 0, queue_wait: 0 }
     }
 
-    /// Counts a time span without events as a wait for memory or for the queue, unless a task computes.
+    /// Counts a time span without events as a wait for memory or for the queue, if no task computes.
     fn pass(&mut self, time: u64, waits_for_queue: bool) {
         if self.computing > 0 {
             return;
@@ -204,7 +204,7 @@ struct Simulation<'a> {
     /// Events in the order of time, then in the order in which they were scheduled.
     events: BinaryHeap<Reverse<(u64, u64, Event)>>,
     foreseen: u64,
-    /// Arithmetic of ray caster, gather unit and controller. If it is shared, the first serves all.
+    /// Arithmetic units of ray caster, gather unit and controller. If they share one, it is the first.
     arithmetic: [Server; 3],
     bus: Server,
     units: [UnitState; 2],
@@ -212,11 +212,11 @@ struct Simulation<'a> {
     hits: Spread,
     /// Number of rays that have not begun.
     rays: u64,
-    /// Number of rays in flight. Each has a reserved place in the queue.
+    /// Number of rays in flight. Each has a reserved queue entry.
     casting: u64,
-    /// Number of gathers in the half that is being filled.
+    /// Number of gathers in the half of the queue that is being filled.
     filling: u64,
-    /// Number of gathers of the drain that have not begun; `draining` counts those that have not ended.
+    /// Number of gathers in the drain that have not begun. `draining` counts those that have not ended.
     ready: u64,
     draining: u64,
     drain_time: u64,
@@ -284,7 +284,7 @@ impl<'a> Simulation<'a> {
         self.events.push(Reverse((time, self.foreseen, event)));
     }
 
-    /// Begins a drain if one is due, and as many tasks as there is room for.
+    /// Begins a drain of the queue if one is due, and as many tasks as may be in flight.
     fn begin_tasks(&mut self) {
         let is_full = self.filling >= self.plan.entries();
         let is_last = self.rays == 0 && self.casting == 0;
@@ -331,8 +331,8 @@ impl<'a> Simulation<'a> {
         self.foresee(end, Event::Computed(unit, steps - 1));
     }
 
-    /// Schedules arithmetic of a unit, or of the controller, whose index is 2. Returns the end of the
-    /// arithmetic.
+    /// Schedules `time` ticks of arithmetic of the unit with index `unit`; index 2 is the controller. Returns
+    /// the time at which the arithmetic ends.
     fn serve(&mut self, unit: usize, time: u64) -> u64 {
         let server = if self.plan.is_shared { 0 } else { unit };
         self.arithmetic[server].serve(self.now, time)

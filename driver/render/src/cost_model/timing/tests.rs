@@ -17,8 +17,8 @@ fn chip(tasks: u32, queue: u64, policy: Policy) -> TimedChip {
     TimedChip { machine: Machine { tasks, ..MACHINE }, queue, policy }
 }
 
-/// Tasks with `steps` steps each. `misses` is the fraction of the steps that miss, `flops` the FLOPs per
-/// step.
+/// Load of `tasks` tasks with `steps` steps each. A step takes `flops` FLOPs, and misses the cache with the
+/// frequency `misses`.
 fn load(tasks: f64, steps: f64, misses: f64, flops: f64) -> Load {
     let requests = tasks * steps;
     Load { tasks, requests, dram_bytes: requests * misses * LINE, flops: requests * flops }
@@ -76,8 +76,8 @@ fn alternating_units_take_the_sum_of_both_times() {
 
 #[test]
 fn overlapped_units_take_the_longer_time_and_one_fill_or_drain_of_a_half() {
-    // No task reads. Half a queue has 50 gathers, and is filled 100 times. A ray takes 4 or 8 ns, a gather 6
-    // ns.
+    // No task reads. Half of the queue has 50 entries, and is filled 100 times. A ray takes 4 or 8 ns, a
+    // gather 6 ns.
     for (ray, longer, rest) in [(400.0, 6.0, 4.0), (800.0, 8.0, 6.0)] {
         let both = frame(load(5000.0, 1.0, 0.0, ray), load(5000.0, 1.0, 0.0, 600.0));
         let found = seconds(&both, &chip(16, 100, Policy::Overlapped(WHOLE)));
@@ -87,8 +87,8 @@ fn overlapped_units_take_the_longer_time_and_one_fill_or_drain_of_a_half() {
 
 #[test]
 fn a_queue_of_one_entry_is_serial() {
-    // Every second ray hits, whatever is in flight: 2 rays of 100 + 2 + 3 ns, and a gather of 2 steps of 100
-    // + 2 + 7 ns.
+    // Every second ray hits, with any number of tasks in flight: 2 rays of 100 + 2 + 3 ns, and a gather of 2
+    // steps of 100 + 2 + 7 ns.
     let both = frame(load(2e5, 1.0, 1.0, 300.0), load(1e5, 2.0, 1.0, 700.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         assert_near(
@@ -114,8 +114,8 @@ fn a_bus_that_both_units_fill_takes_the_sum_of_their_bytes() {
 
 #[test]
 fn units_with_shares_of_the_arithmetic_take_as_long_as_the_slowest() {
-    // With shares in proportion to their work, all three units take as long as the whole chip takes for the
-    // sum. With equal shares the gather unit is the slowest.
+    // If shares are in proportion to work, each unit takes as long as the whole chip would take for all work.
+    // If shares are equal, the gather unit is the slowest.
     let work = FrameLoad {
         rays: load(1e6, 1.0, 0.0, 200.0),
         controller_flops: 1e6 * 100.0,

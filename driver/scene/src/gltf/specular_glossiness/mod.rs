@@ -1,5 +1,5 @@
 //! Converts specular-glossiness materials (`KHR_materials_pbrSpecularGlossiness`) to metallic-roughness ones,
-//! before anything else reads them: factors, and textures as new images.
+//! before anything else reads them. Textures become new images.
 
 mod formula;
 mod texels;
@@ -17,7 +17,7 @@ use self::formula::Appearance;
 pub(super) use self::texels::Grid;
 use super::origin::Origin;
 
-/// Images that are computed from others, by index, and materials whose conversion is incomplete.
+/// Images that are computed from others, and materials whose conversion is incomplete.
 #[derive(Default)]
 pub(super) struct Conversions {
     pub(super) images: BTreeMap<usize, Conversion>,
@@ -33,7 +33,7 @@ pub(super) struct Conversion {
     part: Part,
 }
 
-/// Texture for which an image is computed.
+/// Texture whose image is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     BaseColour,

@@ -76,7 +76,8 @@ pub(super) fn is_deep(bytes: &[u8]) -> bool {
     decoder(bytes).read_header_info().is_ok_and(|info| info.bit_depth == BitDepth::Sixteen)
 }
 
-/// Decodes texels. Those of 16 bits per channel are encoded as `deep` or, if it is `None`, reduced to 8 bits.
+/// Decodes an image. Texels of 16 bits per channel are encoded as `deep` or, if it is `None`, reduced to 8
+/// bits.
 pub(super) fn decode(
     bytes: &[u8],
     [width, height]: [u32; 2],
@@ -105,7 +106,8 @@ pub(super) fn decode(
     Ok(texels)
 }
 
-/// Appends rows in the decoder's output format. `store` encodes texels of 16 bits per channel.
+/// Converts rows in the decoder's output format to texels, and appends them to `texels`. `store` encodes
+/// texels of 16 bits per channel.
 fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth), store: Store<'_>) {
     let samples = colour.samples();
     match depth {

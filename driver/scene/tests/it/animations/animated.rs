@@ -57,7 +57,6 @@ impl Animated {
         &mut self.0.json
     }
 
-    /// Opens the file.
     pub(crate) fn file(&self) -> Result<OpenFile, SceneError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.gltf");

@@ -67,7 +67,7 @@ fn a_single_keyframe_holds_at_all_times() {
     }
 }
 
-/// Corners after a rotation about +z.
+/// Corners after a rotation about +z by an angle in radians.
 fn turned(angle: f64) -> [Vec3; 3] {
     let (sine, cosine) = angle.sin_cos();
     CORNERS.map(|corner| {
@@ -77,7 +77,7 @@ fn turned(angle: f64) -> [Vec3; 3] {
     })
 }
 
-/// Quaternion of a rotation about +z.
+/// Quaternion of a rotation about +z by an angle in radians.
 fn about_z(angle: f64) -> [f32; 4] {
     let (sine, cosine) = (0.5 * angle).sin_cos();
     [0.0, 0.0, sine as f32, cosine as f32]

@@ -6,10 +6,10 @@ use super::super::number;
 const INTERVALS: f64 = 10.0;
 /// Maximum number of tick labels of an axis.
 const MAX_TICKS: usize = 12;
-/// Maximum length, in steps of 1-2-5, of a logarithmic axis that can end at any step. A longer axis ends at
-/// whole decades.
+/// Maximum length of a logarithmic axis that may end at 1, 2 or 5 times a power of ten, counted in these
+/// steps. A longer axis ends at powers of ten.
 const MAX_STEPS: i32 = 9;
-/// Magnitude below which all values of a linear axis are taken as zeros.
+/// A linear axis whose values are all below this magnitude extends from 0 to 1.
 const SMALLEST: f64 = 1e-290;
 /// Tolerance for the rounding of logarithms that should be integers.
 const WHOLE: f64 = 1e-9;
@@ -72,7 +72,7 @@ impl Step {
 }
 
 impl Axis {
-    /// Linear axis over the values from `low` to `high`, extended to whole steps.
+    /// Linear axis over the values from `low` to `high`, extended to multiples of the distance between ticks.
     pub(super) fn linear(low: f64, high: f64) -> Self {
         let size = low.abs().max(high.abs());
         let (low, high) = match high - low > size * 1e-9 {
@@ -138,7 +138,8 @@ impl Axis {
         }
     }
 
-    /// Exponent of the power of ten that the labels omit. It is 0 unless the labels would need many zeros.
+    /// Exponent of the power of ten that the labels omit. It is 0 unless the axis is linear and its greatest
+    /// magnitude is below 10^-3 or at least 10^7.
     pub(super) fn omitted_exponent(&self) -> i32 {
         let size = self.low.abs().max(self.high.abs());
         match self.kind {

@@ -11,7 +11,6 @@ pub(crate) struct Panel {
     pub(crate) x: XAxis,
     /// Vertical axis.
     pub(crate) y: YAxis,
-    /// Series drawn in the panel.
     pub(crate) series: Vec<Series>,
 }
 
@@ -29,7 +28,6 @@ pub(crate) struct XAxis {
 /// Mapping of horizontal values to positions.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum XScale {
-    /// Linear scale.
     #[cfg_attr(not(test), expect(dead_code, reason = "the plainest scale, which tests draw"))]
     Linear,
     /// Logarithmic scale with labels at powers of two.
@@ -72,13 +70,11 @@ pub(crate) struct Series {
     pub(crate) points: Vec<Point>,
 }
 
-/// A point in the units of the axes. Values that are not finite are not drawn, and neither are values of zero
-/// or less on a logarithmic axis; a note below the plot reports them.
+/// A point in the units of the axes. It is not drawn if a value is not finite, or is 0 or less on a
+/// logarithmic axis. A note below the plot counts the points that are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Point {
-    /// Horizontal value.
     pub(crate) x: f64,
-    /// Vertical value.
     pub(crate) y: f64,
     /// Half-width of the confidence interval of `y`: the extent of the error bar in either direction.
     pub(crate) half_width: Option<f64>,

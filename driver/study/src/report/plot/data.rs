@@ -7,10 +7,10 @@ use super::content::{Panel, Point, XScale, YScale};
 const LARGEST: f64 = 1e300;
 /// Minimum value that is drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// Fraction of a value below which the value's error bar does not extend a logarithmic axis.
+/// Least value to which an error bar extends a logarithmic axis, as a fraction of the value at its centre.
 const BAR_SHARE: f64 = 0.1;
 
-/// Points of one series that can be drawn, in runs that are joined by a line.
+/// Points of one series that can be drawn. A line joins the points of each run.
 pub(super) struct Drawable<'a> {
     pub(super) name: &'a str,
     pub(super) runs: Vec<Vec<Mark>>,
@@ -31,7 +31,7 @@ pub(super) enum Reason {
     NoCategory,
 }
 
-/// Points of a series that are not drawn, for one reason.
+/// Number of points of one series that are not drawn for the same reason.
 pub(super) struct LeftOut<'a> {
     pub(super) reason: Reason,
     pub(super) name: &'a str,

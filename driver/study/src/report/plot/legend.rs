@@ -13,7 +13,7 @@ const PADDING: f64 = 8.0;
 /// Minimum distance between rows, in pixels.
 const ROW: f64 = 20.0;
 
-/// A laid-out legend: samples and names in columns of equal width.
+/// A laid-out legend: samples of lines, and names of series, in columns of equal width.
 pub(super) struct Legend {
     /// Index and wrapped name of each series that has a name.
     entries: Vec<(usize, Vec<String>)>,

@@ -36,7 +36,7 @@ pub(super) struct Drawing<'a> {
     title: Vec<String>,
     x_label: Vec<String>,
     y_label: Vec<String>,
-    /// Width of the plotting area, in pixels. `left` and `right` are the space beside it.
+    /// Width of the plotting area, in pixels. `left` and `right` are the widths of the spaces beside it.
     area: f64,
     left: f64,
     right: f64,
@@ -230,7 +230,7 @@ impl<'a> Drawing<'a> {
         let [low, high] = ends.map(|end| frame.y(self.y.place(end)));
         let mut drawn = svg::segment("bar", [x, low], [x, high], colour);
         for (end, y) in ends.into_iter().zip([low, high]) {
-            // A bar that leaves the axis has no cap at its border.
+            // An error bar that extends below the axis has no cap at its lower end.
             if self.y.holds(end) {
                 drawn += &svg::segment("bar", [x - CAP, y], [x + CAP, y], colour);
             }

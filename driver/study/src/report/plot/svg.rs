@@ -35,7 +35,6 @@ impl<'a> Text<'a> {
         Self { class, text, x, y, size, anchor, turn: 0.0, is_bold: false }
     }
 
-    /// Draws the text as an SVG element.
     pub(super) fn draw(&self) -> String {
         let anchor = match self.anchor {
             Anchor::Start => "start",

@@ -283,8 +283,8 @@ fn omitted_points_are_reported_and_interrupt_the_line() {
             "Left out: 2 points of a (zero or less, on a logarithmic axis)."
         ]
     );
-    // There are five markers: of four points, and in the legend. There are two lines: through the only run of
-    // several points, and in the legend.
+    // Five markers: four points, and one in the legend. Two lines: through the only run of several points,
+    // and in the legend.
     assert_eq!((of_class(&svg, "marker").len(), of_class(&svg, "line").len()), (5, 2));
     let names =
         plot(vec![panel(names(&ORDERS), YScale::Linear, vec![series("a", &[(0.5, 1.0), (6.0, 1.0)])])]);

@@ -1,5 +1,5 @@
-//! Size of text. No font is available while plots are drawn, so that widths are those of the widest common
-//! fonts.
+//! Size of text. No font is available while plots are drawn, so widths are upper bounds, which hold for the
+//! widest common fonts.
 
 /// Font size of titles, in pixels.
 pub(super) const TITLE: f64 = 16.0;

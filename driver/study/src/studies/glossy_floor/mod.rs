@@ -133,8 +133,8 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Decrease of the bytes from DRAM from the first to the last exponent. It is estimated from the differences
-/// of each tile (paired samples), because both renders have the same tiles; the variance between tiles
+/// Bytes of the photon map from DRAM at the first exponent minus those at the last. Both renders have the
+/// same tiles, so the estimate is of the difference of each tile (paired samples); the variance between tiles
 /// cancels.
 fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));

@@ -1,6 +1,6 @@
-//! Strip of the picture that shows only the floor.
+//! Traffic of the lowest strip of the picture, which shows only the glossy floor.
 //!
-//! The rest of the picture hardly depends on the floor's exponent, so that lines for the whole picture are
+//! The traffic of the rest hardly depends on the floor's exponent, so that curves of the whole picture are
 //! flatter.
 
 use photoncard_picture::film::Window;
@@ -13,9 +13,9 @@ use super::super::super::scale::Scale;
 use super::super::present::{GLOSSY, columns, gigabytes, key, say, table, text};
 use super::line::{self, LINES, Line, change, exponents, line_name, spread};
 
-/// Height of the strip at the picture's lower edge: the picture's height divided by this number.
+/// Height of the picture divided by the height of the strip at its lower edge.
 const DIVISOR: u32 = 32;
-/// Maximum ratio of a curve's greatest to its least value at which the report calls it nearly flat.
+/// Maximum of `greatest value / least value` for a curve that the report calls nearly flat.
 const NEARLY_FLAT: f64 = 1.1;
 
 /// Point that renders all tiles of the strip, without the irradiance cache.
@@ -79,7 +79,7 @@ fn ends(scale: &Scale) -> (u32, u32) {
 fn verdict(scale: &Scale, results: &Results) -> String {
     let named = |line| (line_name(line), curve(scale, results, line));
     let naive = named(LINES[0]).1;
-    // `tiled` is an order of pixels alone: each gather is done when its ray ends.
+    // `tiled` reorders pixels, not gathers: each gather is done when its ray ends.
     let reordered = LINES.into_iter().filter(|(order, _)| order.has_bins());
     let (flat, other): (Vec<_>, Vec<_>) =
         reordered.map(named).partition(|(_, curve)| spread(curve) <= NEARLY_FLAT);

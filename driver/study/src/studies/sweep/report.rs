@@ -1,4 +1,5 @@
-//! Report of a sweep: traffic by structure and time of a chip at every point, and plots over each axis.
+//! Report of a sweep: memory traffic by structure (kind of data) and time of one chip at every point, and
+//! plots over each axis.
 
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::{Cost, Machine};
@@ -19,7 +20,6 @@ use super::super::workload::{of_frame, symbols};
 /// Maximum number of lines in a plot.
 const MAX_LINES: usize = 8;
 
-/// A sweep with its results.
 struct Swept<'a> {
     axes: &'a Axes,
     points: &'a [Point],
@@ -107,7 +107,7 @@ impl Swept<'_> {
         table
     }
 
-    /// Structures that are read at any point.
+    /// Structures (kinds of data) that a chip reads at any point of the sweep.
     fn read_structures(&self) -> Vec<Structure> {
         let is_read = |structure: &Structure| {
             let mut measured = self.points.iter().map(|point| self.results.traffic(point));
@@ -146,9 +146,9 @@ impl Swept<'_> {
         table
     }
 
-    /// Plot of the bytes of photon map and scene over an axis. There is a line for each combination of the
-    /// values of other axes. An axis that would make more than [`MAX_LINES`] lines keeps its first value
-    /// instead.
+    /// Plot of the bytes of photon map and scene over the values of one axis, with a line for each
+    /// combination of the other axes' values. An axis that would make more than [`MAX_LINES`] lines keeps its
+    /// first value instead.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -171,7 +171,8 @@ impl Swept<'_> {
         plot(&format!("by-{name}"), &format!("Bytes from DRAM by {name}"), &self.caption(&kept), panels)
     }
 
-    /// Plot over an axis with a line for each structure. The other axes have their first value.
+    /// Plot of the bytes from DRAM over the values of one axis, with a line for each structure. The other
+    /// axes have their first value.
     fn plot_of_structures(&self, axis: usize) -> Block {
         let first = vec![0; self.axes.list().len()];
         let lines = self.read_structures().into_iter().map(|structure| {
@@ -187,7 +188,8 @@ impl Swept<'_> {
         plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
     }
 
-    /// Line over an axis. The other axes have the values of the combination `indices`.
+    /// Line of `bytes` over the values of one axis. The other axes have the values of the combination
+    /// `indices`.
     fn line(
         &self,
         name: String,
@@ -208,7 +210,8 @@ impl Swept<'_> {
         series(name, points)
     }
 
-    /// Divides the other axes into those in which lines differ, and those that keep their first value.
+    /// Returns the indices of the other axes: first of those in which lines differ, then of those that keep
+    /// their first value.
     fn other_axes(&self, axis: usize) -> (Vec<usize>, Vec<usize>) {
         let (mut varied, mut kept, mut lines) = (Vec::new(), Vec::new(), 1);
         for (other, Axis { values, .. }) in
@@ -232,7 +235,8 @@ impl Swept<'_> {
     }
 }
 
-/// Horizontal positions of the values: numbers and sizes at their value, other texts at their index.
+/// Horizontal positions of the values: the values if all are positive numbers or sizes, otherwise their
+/// indices.
 fn places(axis: &Axis) -> Vec<f64> {
     numbers(axis).unwrap_or_else(|| (0..axis.values.len()).map(|index| index as f64).collect())
 }
@@ -258,7 +262,7 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     axis.values.iter().map(number).collect()
 }
 
-/// Time that the memory and the arithmetic of one chip take for a frame, seconds.
+/// Times that the memory and the arithmetic of one chip take for a frame, seconds.
 fn chip_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> [f64; 2] {
     let symbols = symbols(&point.settings);
     let workload = of_frame(measured, symbols.pixels(), &symbols);

@@ -18,8 +18,8 @@ pub(super) struct Technique {
     pub(super) radiance: Radiance,
     pub(super) layout: PhotonLayout,
     pub(super) tile: u32,
-    /// Chip on which all tiles are measured, several in flight; `None` to measure some tiles, one at a time,
-    /// on reference chips.
+    /// Chip on which all tiles are measured, several in flight; `None` to measure a sample of the tiles, one
+    /// at a time, on reference chips.
     pub(super) in_flight: Option<Setup>,
 }
 
@@ -128,9 +128,9 @@ impl Technique {
         self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
-    /// Numbers of gather rays at which the technique's error is measured, ascending. To reach an error,
-    /// combined sampling by itself needs about as many rays as the naive render; interpolated light may need
-    /// fewer or more.
+    /// Numbers of gather rays at which the technique's error is measured, ascending. The range is narrower
+    /// for combined sampling by itself, which needs about as many rays as the naive render for the same
+    /// error. Interpolated or precomputed light may need fewer or more.
     pub(super) fn sweep(&self, scale: &Scale) -> Vec<u32> {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];
@@ -142,8 +142,8 @@ impl Technique {
     }
 
     /// Numbers of gather rays at which the technique's bytes are measured, ascending. Beyond
-    /// [`MAX_TRAFFIC_RAYS`] the curve of the bytes is nearly straight. Whole frames are measured at fewer
-    /// numbers.
+    /// [`MAX_TRAFFIC_RAYS`] the curve of the bytes is nearly straight. Techniques measured with tiles in
+    /// flight, on whole frames, have fewer numbers.
     pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
         let mut rays = match self.in_flight {
             Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),

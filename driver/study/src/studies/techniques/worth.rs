@@ -1,4 +1,4 @@
-//! Worth of techniques at equal quality: rays and bytes needed to reach an error, factors between techniques
+//! Compares techniques at equal quality: rays and bytes needed to reach an error, factors between techniques
 //! with their intervals, and conclusions.
 
 use super::super::super::laboratory::Results;
@@ -97,8 +97,8 @@ impl Measured<'_> {
         Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
     }
 
-    /// Number of rays at which a technique reaches the naive render's error, with errors over all tiles, or
-    /// over all tiles but `omitted`.
+    /// Number of rays at which a technique reaches the naive render's error. Errors are those of all tiles
+    /// except `omitted`.
     fn at_quality(&self, technique: &Technique, omitted: Option<usize>) -> AtQuality {
         let rmse = |technique, rays| {
             let quality = self.quality(technique, rays);
@@ -173,7 +173,7 @@ fn range(ratio: Ratio) -> String {
     format!("{} to {}", say(ratio.lower), say(ratio.upper))
 }
 
-/// Comparison of a technique with another at equal quality.
+/// Result of comparing the bytes that two techniques read at equal quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     Pays,
