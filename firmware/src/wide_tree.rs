@@ -102,8 +102,9 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
     }
 
-    /// Begins the traversal of the group's tree with this root, whose distance bits are `bits`. After the group's last node or leaf, the
-    /// traversal returns the leaf [`END_OF_GROUP`]. Returns the argument of [`Self::end_group`].
+    /// Begins the traversal of a group's tree at the node `root`, whose distance bits are `bits`. After the
+    /// last part of the group, [`Self::pop`] returns the leaf [`END_OF_GROUP`]. Returns the argument of
+    /// [`Self::end_group`].
     ///
     /// # Errors
     /// [`FaultCode::Depth`] if the stack overflows.

@@ -216,7 +216,7 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Sets the rays for tests of boxes in the space of an instance's group, or in world space. `reach` is the
+    /// Prepares the rays for boxes in the space of an instance's group, or in world space. `reach` is the
     /// greatest absolute coordinate of the scene.
     #[cold]
     #[inline(never)]

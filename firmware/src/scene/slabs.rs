@@ -64,8 +64,8 @@ impl Slabs {
         slabs
     }
 
-    /// Bits of the distance at which the ray enters each child's box; [`BEYOND`] if the ray misses the box or
-    /// enters it beyond `until`.
+    /// Distance at which the ray enters each child's box, as `f32` bits; [`BEYOND`] if the ray misses the box
+    /// or enters it beyond the distance `until`, metres.
     #[inline(always)]
     pub(super) fn enter(&self, isa: impl Isa, node: BvhNode, children: usize, until: f32) -> [u32; LANES] {
         let [x, y, z] = node.axes();

@@ -43,8 +43,8 @@ pub(super) struct NearTriangle {
 }
 
 impl Ball {
-    /// A ball in the space of an instance's group that contains this one, with a margin for rounding. `reach` is
-    /// the greatest absolute coordinate of the scene.
+    /// Returns a ball in the space of an instance's group that contains this ball, with a margin for
+    /// rounding. `reach` is the greatest absolute coordinate of the scene.
     fn in_group(self, instance: &Instance, reach: f32) -> Self {
         let rows = instance.to_group.map(|[a, b, c, _]| Vec3::new(a, b, c));
         // The Frobenius norm is at least the factor by which the transform stretches any vector.

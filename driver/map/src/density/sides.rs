@@ -133,8 +133,7 @@ impl SideTable {
         self.stored(triangle).placed(triangle, corners)
     }
 
-    /// Sides of a triangle as in its group, before [`Sides::placed`]; for an index out of range, sides without
-    /// photons.
+    /// Sides of a triangle in the space of its group; for an index out of range, sides without photons.
     #[inline(always)]
     pub(super) fn stored(&self, triangle: TriangleId) -> Sides {
         self.sides.get(triangle.index as usize).copied().unwrap_or_default()
@@ -145,12 +144,12 @@ impl SideTable {
         self.sides.get(triangle.index as usize).is_some_and(|sides| sides.has_cut_outs)
     }
 
-    /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
-    /// emit or transmit light. A surface is closed if each edge of its triangles is shared with one other
-    /// triangle, which has the edge in the opposite direction. Where meshes touch and more than two triangles
-    /// share an edge, two triangles bound a solid together if they are neighbours by angle around the edge
-    /// and no other solid lies between them. `leaves` are those of the scene or of a group; the first of them
-    /// has the index `first`.
+    /// Marks the double-sided triangles of closed surfaces as solid, because no light enters these. Surfaces
+    /// that emit or transmit light are excluded. A surface is closed if each edge of its triangles is shared
+    /// with one other triangle, which has the edge in the opposite direction. Where meshes touch, more than
+    /// two triangles share an edge. Two of them then bound a solid together if they are neighbours by angle
+    /// around the edge and no other solid lies between them. `leaves` are the leaves of the scene or of one
+    /// group; `first` is the index of the first of them.
     fn find_closed_sheets(&mut self, leaves: &[Line], first: usize, finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();

@@ -19,12 +19,13 @@ use super::crossings::Crossings;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
 
-/// Maximum number of triangles of a list. With more, a traversal per ray is faster.
+/// Maximum number of triangles in [`Surroundings`]. With more, tracing each chord through the hierarchy is
+/// faster.
 const MAX_TRIANGLES: usize = 1536;
 /// Number of triangles above which a ball is crowded: few chords suffice.
 const CROWD: usize = 512;
-/// Number of triangles above which repeated triangles are omitted: thousands of coincident triangles act as
-/// one.
+/// Number of listed triangles from which duplicates are omitted. Thousands of coincident triangles then act
+/// as one.
 const MAX_WITH_TWINS: usize = 512;
 /// Maximum number of triangles in a ball that `Surroundings::is_plain` tests for coplanarity.
 const MAX_PLAIN: usize = 24;

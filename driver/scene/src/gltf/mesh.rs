@@ -90,8 +90,10 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Counts `copies` copies of mesh `index`, fewer than [`MAX_TRIANGLES`] in all, because the triangles of a
-    /// group count too. `worlds` are the copies' world transforms.
+    /// Counts `copies` copies of mesh `index`; `worlds` are their world transforms.
+    ///
+    /// # Errors
+    /// If [`MAX_TRIANGLES`] copies or more are counted, as a scene has at least one triangle besides.
     pub(super) fn count(
         &mut self,
         index: usize,

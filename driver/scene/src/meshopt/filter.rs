@@ -104,8 +104,8 @@ fn float(word: [u8; 4]) -> [u8; 4] {
     libm::ldexpf(mantissa as f32, word >> 24).to_le_bytes()
 }
 
-/// Decodes a YCoCg colour (luma, chroma orange, chroma green) with alpha, and scales it by `whole`. If bit b
-/// is the highest set bit of alpha, the code of 1 is `2^(b + 1) - 1`.
+/// Decodes a `YCoCg` colour (luma, chroma orange, chroma green) with alpha, and scales it by `whole`. If bit
+/// b is the highest set bit of alpha, the code of 1 is `2^(b + 1) - 1`.
 fn colour([luma, orange, green, alpha]: [i32; 4], whole: f32) -> [f32; 4] {
     let bit = alpha.checked_ilog2().unwrap_or(0);
     let one = (2 << bit) - 1;
