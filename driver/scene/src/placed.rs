@@ -23,7 +23,8 @@ impl Scene {
         self.triangles.len() as u64 + self.instances.iter().map(of_instance).sum::<u64>()
     }
 
-    /// Area of all surfaces, m^2. That of an instance is its group's times [`Instance::area_factor`].
+    /// Area of all surfaces, m^2. An instance counts with the area of its group, multiplied by
+    /// [`Instance::area_factor`].
     pub fn area(&self) -> f64 {
         let of =
             |triangles: &[Triangle]| triangles.iter().map(|triangle| triangle.area() as f64).sum::<f64>();

@@ -30,8 +30,8 @@ const EVEN_SHARE: f32 = 0.55;
 const EMPTY_CELL: f32 = 0.1;
 /// Number of directions sampled from the lobe to distribute it over the cells.
 const LOBE_POINTS: u32 = 32;
-/// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. Half of such
-/// a lobe goes to the cells, half to the lobe's own entry.
+/// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. A product
+/// table gives half of the light that such a lobe reflects to its cells, and half to its entry for the lobe.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
 /// Minimum share of the rays for the lobe's own entry, as a multiple of
 /// `lobe albedo / (diffuse albedo + lobe albedo)`.

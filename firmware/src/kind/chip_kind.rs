@@ -17,8 +17,8 @@ pub trait ChipKind: 'static {
     type GatherQueue: Capacity;
     /// Containers with capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
-    /// Containers for gather points whose rays are cast together: the points of all irradiance records of a
-    /// block, or of some consecutive pixels of it.
+    /// Containers for gather points whose rays are cast together. The points belong to all irradiance records
+    /// of a block of pixels, or to some consecutive pixels of the block.
     type Points: Capacity;
     /// Containers with capacity [`Budget::in_flight`].
     type Flights: Capacity;

@@ -85,9 +85,9 @@ impl<'a> PhotonNode<'a> {
         of_one & without
     }
 
-    /// Stores, in a node of a caustic map, the classes ([`normal_class`](super::normal_class)) of each
-    /// child's normals. `children` yields one bit mask of classes per child. [`Self::children_without`] never
-    /// returns a child that has several classes.
+    /// Stores, in a node of a caustic map, the class ([`normal_class`](super::normal_class)) of each child
+    /// whose normals have one class in common. `children` yields one bit mask of classes per child. A child
+    /// of several classes has none stored, and [`Self::children_without`] never returns it.
     pub fn set_classes(line: &mut [u8; LINE_BYTES], children: impl IntoIterator<Item = u16>) {
         let (mut of_one, mut codes) = (0_u16, 0_u64);
         for (child, classes) in children.into_iter().enumerate().take(NODE_CHILDREN) {

@@ -11,8 +11,8 @@ use super::lanes::Lane;
 
 /// Maximum number of batches of sixteen chords.
 pub(super) const BATCHES: usize = 12;
-/// Number of batches in a ball of many triangles. Each chord crosses many surfaces there.
-const FEW_BATCHES: usize = 2;
+/// Number of batches in a ball of many triangles, where each chord crosses many surfaces.
+const FEW_BATCHES: usize = 4;
 
 /// Sixteen neighbouring chords: their points in the disc perpendicular to them, and the bounds of these
 /// points.

@@ -74,7 +74,7 @@ struct Finish {
 }
 
 impl SideTable {
-    /// Reads the sides from a card image.
+    /// Computes front and back ([`Sides`]) of every triangle in a card image.
     ///
     /// # Errors
     /// If the card image is malformed.

@@ -18,8 +18,8 @@ const MAX_PROBED: u32 = 64;
 /// Area of a kernel's disc relative to a uniform disc with equal variance. The kernel falls towards its edge
 /// and thus uses fewer photons effectively.
 const AREA: f32 = 4.0 / 3.0;
-/// Maximum radius relative to the diagonal of the scene. Photons of sparser light are visible, as faint spots
-/// of this size.
+/// Maximum radius of a photon's kernel, as a fraction of the diagonal of the scene. Where light is so sparse
+/// that a larger radius would be needed, single photons show as faint spots of this size.
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;

@@ -87,7 +87,8 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of direct light in the renders with the greater numbers of shadow and gather rays.
+    /// Noise of the direct light of each pixel, measured from two pilot renders with equal settings, which
+    /// cast the greater of the compared numbers of shadow and gather rays.
     pub(super) deviations: Deviations,
 }
 

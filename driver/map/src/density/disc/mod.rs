@@ -293,7 +293,7 @@ impl<'a> Meter<'a> {
         fractions: &mut [Fraction; LEAF_PHOTONS],
     ) -> Result<(), Fault> {
         let Cluster { ball, radius, outer } = *cluster;
-        let is_crowded = !self.is_complete || self.surroundings.is_crowded();
+        let is_crowded = self.surroundings.is_crowded();
         let chords = if is_crowded { &self.few_chords } else { &self.chords }.scaled(outer / ball.radius);
         if self.is_complete {
             self.surroundings.cross(frame, &chords, &mut self.crossings);
@@ -348,9 +348,9 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds to [`Self::surfaces`] each crossing in `Self::covered` that is near enough to a photon to be
-    /// lit ([`super::evidence`]). A crossing is skipped if the gap to the crossing above is within the error
-    /// of the photon grid.
+    /// Adds to [`Self::surfaces`] the crossings below others (`Self::covered`) that a photon of the map shows
+    /// to be lit ([`super::evidence`]). `photon` is the position of the photon whose disc is measured. A
+    /// crossing is skipped if the gap to the crossing above it is within the error of the photon grid.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
