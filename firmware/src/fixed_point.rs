@@ -28,8 +28,8 @@ impl Sum {
         self.add_bits((term * SCALE) as i64);
     }
 
-    /// Adds a non-negative term, in units; the sum saturates. The result does not depend on the order,
-    /// because a sum that only grows saturates in every order or in none.
+    /// Adds a non-negative term, in units; the sum saturates. The result does not depend on the order of the
+    /// terms, because a sum that only grows saturates in every order or in none.
     #[inline(always)]
     fn add_up_to_greatest(&mut self, term: f32) {
         let bits = ((term * SCALE) as i64).max(0);
@@ -51,7 +51,7 @@ impl Sum {
 /// Fixed-point sum of colours, exact except for the rounding of each term.
 ///
 /// Each component is a [`Sum`]. The reflected power of k photons of one unit each is far below the limit of
-/// 2^23 units, since the factors are at most a few thousand.
+/// 2^23 units, since the factors of a reflection are at most a few thousand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
@@ -90,7 +90,8 @@ impl ColourSum {
         self.add_powers(&[u32::from_le_bytes(power.0).into()]);
     }
 
-    /// Adds the power of each photon content: an [`Rgbe`] colour in its low four bytes.
+    /// Adds the powers of photons. Each photon is given by its content, which has an [`Rgbe`] colour in its
+    /// low four bytes.
     #[inline(always)]
     pub(crate) fn add_powers(&mut self, photons: &[u64]) {
         let mut sums = [0_u64; 3];
@@ -106,7 +107,7 @@ impl ColourSum {
         }
     }
 
-    /// Subtracts the power of a photon content that [`Self::add_powers`] has added.
+    /// Subtracts the power of a photon that [`Self::add_powers`] has added, given by its content.
     #[inline(always)]
     pub(crate) fn subtract_power(&mut self, photon: u64) {
         for (sum, bits) in self.0.iter_mut().zip(bits_of_power(photon)) {
@@ -127,7 +128,8 @@ impl ColourSum {
     }
 }
 
-/// Power of a photon content by channel, in steps of 2^-40 units: the [`Rgbe`] colour in its low four bytes.
+/// Power of a photon by channel, in steps of 2^-40 units: the [`Rgbe`] colour in the content's low four
+/// bytes.
 #[inline(always)]
 fn bits_of_power(photon: u64) -> [u64; 3] {
     // Exponent byte with which a mantissa counts steps of 2^-40 units.

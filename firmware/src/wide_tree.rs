@@ -16,7 +16,7 @@ use crate::simd::{Isa, LANES};
 
 const _: () = assert!(NODE_CHILDREN == LANES);
 
-/// Value of a child's distance bits that means that the child is skipped.
+/// Distance bits of a child that is to be skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
 /// Stack entry of a leaf or node. The upper 32 bits are its distance bits: the `f32` bits of a lower bound of
@@ -27,8 +27,8 @@ struct Deferred(u64);
 /// Flag in the lower 32 bits of a [`Deferred`] that marks a leaf.
 const LEAF: u32 = 1 << 31;
 
-/// Index of a leaf that no card image has. On the stack it lies below the parts of a group
-/// ([`Descent::begin_group`]).
+/// Index of a leaf that no card image has. It marks the end of a group on the stack, below the group's nodes
+/// and leaves ([`Descent::begin_group`]).
 pub(crate) const END_OF_GROUP: u32 = !LEAF;
 
 impl Deferred {
@@ -44,8 +44,8 @@ impl Deferred {
     }
 }
 
-/// Stack of [`Deferred`] entries. The capacity `ENTRIES` is the maximum that the tree needs plus [`LANES`],
-/// because all lanes of a node are written at once.
+/// Stack of the nodes and leaves to be visited, each a [`Deferred`] entry. The capacity `ENTRIES` is the
+/// maximum that the tree needs plus [`LANES`], because all lanes of a node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
 /// Order in which a node's children are visited.
@@ -53,11 +53,11 @@ pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 pub(crate) enum Order {
     /// Nearest first. Hits or photons found in one child shrink the search distance for the others.
     NearestFirst,
-    /// Unsorted, for searches that end at the first hit. Sorting would cost more than it saves.
+    /// Unsorted, for searches whose distance limit does not shrink. Sorting would cost more than it saves.
     Any,
 }
 
-/// State of a traversal outside the group that it is in.
+/// Saved state of the traversal around a group, while the group is traversed.
 pub(crate) struct Outside {
     /// Number of stack entries.
     entries: usize,
@@ -103,8 +103,8 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 
     /// Begins the traversal of a group's tree at the node `root`, whose distance bits are `bits`. After the
-    /// last part of the group, [`Self::pop`] returns the leaf [`END_OF_GROUP`]. Returns the argument of
-    /// [`Self::end_group`].
+    /// last node or leaf of the group, [`Self::pop`] returns the leaf [`END_OF_GROUP`]. Returns the state
+    /// that [`Self::end_group`] restores.
     ///
     /// # Errors
     /// [`FaultCode::Depth`] if the stack overflows.
@@ -120,7 +120,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(outside)
     }
 
-    /// Returns to the tree around a group.
+    /// Ends the traversal of a group's tree, and restores the state of the traversal around it.
     #[inline(always)]
     pub(crate) fn end_group(&mut self, Outside { entries, visits_left }: Outside) {
         self.stack.truncate(entries);
@@ -214,7 +214,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 }
 
-/// [`Deferred`] entry of each child of a node.
+/// Stack entry ([`Deferred`]) of each child of a node.
 #[inline(always)]
 fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES] {
     let Links { leaves, first_leaf, first_node } = node.links();

@@ -61,8 +61,8 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// Returns table rows about an emulated chip's on-chip memory: its buffers, the bytes of them that each
-/// technique uses, and the free bytes.
+/// Returns table rows about an emulated chip's on-chip memory, bytes: all buffers, the buffers of each of
+/// three techniques, and the free rest.
 fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [

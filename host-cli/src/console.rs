@@ -59,7 +59,7 @@ pub(crate) fn write_out(text: &str) -> Result<(), Failure> {
     write_bytes(text.as_bytes())
 }
 
-/// [`write_out`] for arbitrary bytes.
+/// Writes bytes to standard output. It is no error if the reader closes the stream early.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {

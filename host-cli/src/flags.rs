@@ -2,7 +2,8 @@
 
 use photoncard_driver::render::{RenderSettings, Setting};
 
-/// Names in the library's errors besides fields of the settings, each with the flags that replace it.
+/// Names in the library's errors that `RenderSettings::options` does not list, with the flags that replace
+/// them.
 const OTHERS: [[&str; 2]; 3] = [
     ["`cards.caches`", "--counters or --cache"],
     ["`CardAddress::with_memory`", "--card-memory"],

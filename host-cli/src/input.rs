@@ -12,7 +12,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 
-/// Lists the input files, each with its name in errors, such as `the scene`.
+/// Returns the paths of the input files, each with its name in errors: `the scene` or `the environment`.
 pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     let mut files = vec![(options.path.as_path(), "the scene")];
     if let Some(EnvironmentOption::File(path)) = &options.environment {
@@ -31,7 +31,7 @@ pub(crate) fn load(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Fai
 /// Opened scene file and environment, which are read once for all frames.
 pub(crate) struct Input {
     pub(crate) file: SceneFile,
-    /// Environment, with the notice about clamped texels if there are any.
+    /// Environment light, with a notice if texels of its map were clamped.
     environment: Option<(Environment, Option<String>)>,
     /// Rotation of the environment, degrees; `None` if it is not stated.
     rotation: Option<f32>,
@@ -68,9 +68,9 @@ impl Input {
     }
 }
 
-/// Completes a loaded scene. Compensates the energy of rough reflections if requested. Adds the environment,
-/// with the notice about clamped texels. The environment is turned by `rotation` degrees, plus the turn that
-/// the scene's exporter implies. Adds remarks about this turn, and about a rotation without effect.
+/// Adds the environment to a loaded scene, turned by `rotation` degrees plus the turn that the scene's
+/// exporter implies. Compensates the energy of rough reflections if `compensates_energy`. Adds notices about
+/// clamped texels, about the exporter's turn, and about a rotation without effect.
 fn completed(
     mut scene: Scene,
     (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),

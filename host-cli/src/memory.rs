@@ -4,9 +4,9 @@ use std::fs::read_to_string;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Returns the free memory at the first call, bytes; `None` on systems other than Linux. It is the minimum of
-/// Linux's estimate for the machine, the limit of this process's address space, and the memory that the
-/// process's control groups leave.
+/// Returns the free memory, bytes, measured at the first call; `None` on systems other than Linux. It is the
+/// minimum of Linux's estimate for the machine, the limit of this process's address space, and the memory
+/// that the process's control groups leave.
 pub(crate) fn free_memory() -> Option<u64> {
     static FREE: OnceLock<Option<u64>> = OnceLock::new();
     *FREE.get_or_init(|| {

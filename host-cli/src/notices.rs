@@ -14,8 +14,8 @@ use crate::failure::Failure;
 /// Maximum number of sentences in one message. Further sentences are only counted.
 const NAMED: usize = 3;
 
-/// Contents of the scene file that pictures use. View and environment are used unless options replace them;
-/// animations are used if frames are requested.
+/// Flags of the contents of a scene file that pictures use: its view (camera) and its environment unless
+/// options replace them, its animations if frames are requested.
 pub(crate) struct Uses {
     view: bool,
     animations: bool,
@@ -23,7 +23,7 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Returns the contents that the pictures use: `picture` or, if `frames` states any, the frames.
+    /// Returns the contents that a render of `picture`, or of the frames that `frames` states, uses.
     pub(crate) fn of(options: &SceneOptions, picture: &Picture, frames: Option<&FrameOptions>) -> Self {
         Self {
             view: !picture.states_view(),
@@ -122,8 +122,8 @@ mod tests {
         assert_eq!(refused("", &scene.with(|scene| scene.notices.clear())), None);
     }
 
-    /// Each case has the contents that a notice is about, options that replace these contents, and options
-    /// with which pictures use them, if there are any.
+    /// A case has contents of a scene, options that replace them and, if there are any, options that use
+    /// them.
     #[test]
     fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [

@@ -26,8 +26,8 @@ pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Pa
     Ok(())
 }
 
-/// Checks that each existing file at `paths` was written by photoncard. No option states these paths, and no
-/// other program's file may be replaced.
+/// Checks that each existing file at `paths`, which no option states, was written by photoncard: files of
+/// other programs are never replaced there.
 pub(crate) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
     let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else {
         return Ok(());

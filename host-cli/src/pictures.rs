@@ -72,7 +72,7 @@ fn say_dazzling(film: &Film) {
     }
 }
 
-/// Failure of a merge: of the work if memory is short or two files of one part differ, else of the input.
+/// Failure of a merge: `Work` if memory is short or two files of one part differ, otherwise `Input`.
 fn merge_failure(error: PartError) -> Failure {
     match error {
         PartError::Film(_) | PartError::Unequal { .. } => Failure::work(error),

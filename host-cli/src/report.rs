@@ -139,9 +139,9 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// Cuts at most `width` characters out of a line, and returns them with the new column of the character `at`.
-/// A mark of `mark` columns, which begins below this character, also fits into `width` columns. An ellipsis
-/// replaces the character at each end that is cut off.
+/// Returns an excerpt of a line, at most `width` characters around the character `at`, and this character's
+/// column in the excerpt. A mark of `mark` columns that begins at this column also fits into `width`. An
+/// ellipsis replaces the character at each end that is cut off.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     let least = (at + mark).saturating_sub(width).min(at);

@@ -87,9 +87,9 @@ impl Mesh {
         self.cuboid(Vec3::new(-half, bottom, -half), Vec3::new(half, top, half));
     }
 
-    /// Adds a grid of `columns` by `rows` vertices. `point` returns the position of the vertex of a column
-    /// and a row. The front normal is the cross product of the step to the next column and the step to the
-    /// next row. `wrap` joins the last column to the first, the last row to the first, or both.
+    /// Adds a grid of `columns` by `rows` vertices at the positions `point(column, row)`. The front normal is
+    /// the cross product of the step to the next column and the step to the next row. `wrap` joins the last
+    /// column to the first, the last row to the first, or both.
     pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
         self.grid_cut(size, wrap, point, |_, _| false);
     }

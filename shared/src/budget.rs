@@ -28,8 +28,8 @@ pub struct Budget {
     pub gather_rays: u32,
     /// Capacity of the queue in which photon gathers wait to be reordered, gathers.
     pub gather_queue: u32,
-    /// Maximum number of irradiance cache records of a block; a power of two. A tile that needs more is
-    /// divided into blocks.
+    /// Maximum number of irradiance cache records of a block; a power of two. A block is a tile, or a part of
+    /// a tile whose records would exceed this number.
     pub irradiance_records: u32,
     /// Maximum number of shadow rays of a sample.
     pub shadow_rays: u32,

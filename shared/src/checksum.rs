@@ -81,7 +81,7 @@ impl Default for Checksum {
 }
 
 impl Checksum {
-    /// Appends bytes.
+    /// Continues the checksum with `bytes`.
     #[inline]
     pub fn update(&mut self, bytes: &[u8]) {
         let (sixteens, rest) = bytes.as_chunks::<16>();
@@ -124,7 +124,7 @@ impl Default for ImageChecksum {
 }
 
 impl ImageChecksum {
-    /// Appends lines.
+    /// Continues the checksum with `lines`.
     pub fn update(&mut self, lines: &[Line]) {
         // A line is a multiple of eight bytes.
         for &eight in lines.iter().flat_map(|line| line.0.as_chunks::<8>().0) {

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Eye rays. In a pixel with gather rays, a path takes at least two: one to place its gather point, one
-    /// to complete the pixel. If the gather point is seen in a mirror or through glass, the path is also
-    /// traced again for the point's shadow rays, and for each group of up to 64 of its gather rays. In other
-    /// pixels a path takes one. A survey takes one for each lattice point that it visits.
+    /// Eye rays. A path of a pixel without gather rays takes one. A path of a pixel with gather rays takes at
+    /// least two: one to place its gather point, one to complete the pixel. If the gather point is seen in a
+    /// mirror or through glass, the path is also traced again for the point's shadow rays, and for each group
+    /// of up to 64 of its gather rays. A survey takes one for each lattice point that it visits.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
@@ -99,9 +99,9 @@ impl Counters {
         most_waiting: 0,
     };
 
-    /// Counts one search for the k nearest photons. The arguments are the numbers of photons tested, of
-    /// photons that became candidates, of candidates read by selections and comparisons made by selections,
-    /// and of photons found.
+    /// Counts one search for the k nearest photons. The arguments count photons whose distance was computed,
+    /// photons that became candidates, candidates read and distances compared by selections, and photons
+    /// returned.
     #[inline(always)]
     pub fn count_gather(&mut self, tested: u32, taken: u32, [selected, compared]: [u32; 2], found: u32) {
         self.gathers += 1;

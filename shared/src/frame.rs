@@ -65,8 +65,8 @@ pub enum FrameKind {
     Open = 1,
     /// An acknowledgement without a message.
     Acknowledge = 2,
-    /// A request for an [`Self::Answer`], which also reports losses: the receiver's messages with numbers
-    /// below the probe's sequence number are lost, unless the probe acknowledges them.
+    /// A request for an [`Self::Answer`]. It also reports losses: the receiver's messages with numbers below
+    /// the probe's sequence number are lost, unless the probe acknowledges them.
     Probe = 3,
     /// Reply to a probe. Its sequence number is that of the sender's next message.
     Answer = 4,
@@ -92,8 +92,8 @@ pub struct FrameHeader {
     /// next message, a probe the bound described at [`FrameKind::Probe`]. Other frames without a message have
     /// 0.
     pub sequence: u16,
-    /// Number of the next message of the other direction that the frame's sender expects. It has taken all
-    /// messages before.
+    /// Number of the next message of the other direction that the frame's sender expects. The sender has
+    /// taken all messages before that one.
     pub acknowledged: u16,
     /// Bit `i` is set if message `acknowledged + i` of the other direction has arrived.
     pub held: u8,

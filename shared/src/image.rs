@@ -4,9 +4,9 @@
 //! sections. A section is a sequence of lines with records of one kind ([`crate::layout`]). Each line holds
 //! as many whole records as fit; unused bytes are zero.
 //!
-//! The photon map has one of two layouts: [`SectionKind::Photons`], or [`SectionKind::PhotonNodes`] with
-//! [`SectionKind::PhotonLeaves`]. The sections of the other layout are empty. Sections of irradiance points,
-//! the caustic map, textures and vertex attributes are empty if the scene has none.
+//! The photon map is either a kd-tree ([`SectionKind::Photons`]) or a wide tree ([`SectionKind::PhotonNodes`]
+//! and [`SectionKind::PhotonLeaves`]). The sections of the layout that is not used are empty. Sections of
+//! irradiance points, the caustic map, textures and vertex attributes are empty if the scene has none.
 
 use core::fmt;
 
@@ -24,7 +24,7 @@ pub const LAYOUT_VERSION: u16 = 16;
 pub const HEADER_LINES: usize = 2;
 /// Number of entries of [`SectionKind::LeafAttributes`] per line.
 pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Number of thresholds of [`SectionKind::EnvironmentCells`] per line.
+/// Number of cumulative probabilities of [`SectionKind::EnvironmentCells`] per line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
 /// Sections of a card image, in the order of their lines and of their entries in the section table.
@@ -60,9 +60,9 @@ pub enum SectionKind {
     /// function of the rows comes first, then for each row the conditional function of its cells. Each
     /// function ends with 2^32 - 1.
     ///
-    /// If cells are subdivided, four further parts follow: the number of subdivided cells; the number n such
-    /// that each is divided into n x n parts; the row-major numbers of these cells, in increasing order; and
-    /// for each of these cells the distributions of its n rows and n x n parts, in the same form.
+    /// If m cells are subdivided into n x n subcells each, these values follow: m; n; the row-major numbers
+    /// of the m cells, in increasing order; and, for each of these cells, the distributions of its n rows and
+    /// n x n subcells, in the form above.
     EnvironmentCells = 11,
     /// [`Photon`]s as a left-balanced kd-tree: the children of photon `i` are photons `2 i + 1` and
     /// `2 i + 2`.
@@ -156,7 +156,7 @@ impl SectionKind {
     }
 }
 
-/// Position and size of a section: consecutive records of one kind.
+/// Position and size of a section, which consists of consecutive records of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Section {
     /// Index of the section's first line.
@@ -374,8 +374,8 @@ impl Header {
         }
     }
 
-    /// Returns the units of a pixel's sums: the radiance unit, and the side of a photon grid cell as the unit
-    /// of depth.
+    /// Returns the units in which a pixel's sums are stored. The unit of light is the radiance unit, the unit
+    /// of depth is the side of a photon grid cell.
     pub fn sum_scale(&self) -> SumScale {
         SumScale { radiance: self.radiance_unit, depth: self.photon_grid.cell }
     }

@@ -9,7 +9,7 @@ use heapless::Vec;
 /// Code of a piece of 254 bytes, the longest. No zero byte follows such a piece.
 const FULL: u8 = 0xff;
 
-/// Returns the maximum length after stuffing of `plain` bytes.
+/// Returns the maximum length of `plain` bytes after stuffing.
 pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }

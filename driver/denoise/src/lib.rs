@@ -9,8 +9,8 @@
 //! 3. the package `pyoidn` of Python, in the active environment, the user's or the system's;
 //! 4. the library folders of the system.
 //!
-//! Rounding makes a denoised picture depend on the library's version and on the processor. The film is not
-//! changed.
+//! Rounding makes a denoised picture depend on the library's version and on the processor. The film, which
+//! holds the rendered pixels, is not changed.
 
 #![deny(unsafe_code)]
 
@@ -35,8 +35,8 @@ impl Denoiser {
     /// Loads the library.
     ///
     /// # Errors
-    /// [`DenoiseError::Missing`]; [`DenoiseError::Unusable`] if a file of the library does not load;
-    /// [`DenoiseError::Failed`] if the library cannot use the processor.
+    /// [`DenoiseError::Missing`] if no file of the library is found; [`DenoiseError::Unusable`] if a file of
+    /// it does not load; [`DenoiseError::Failed`] if the library cannot use the processor.
     pub fn find() -> Result<Self, DenoiseError> {
         if let Some(path) = places::stated() {
             return Self::open(path);
@@ -69,8 +69,8 @@ impl Denoiser {
     /// Returns the denoised radiance of a complete film, W/(sr m^2), row by row from the top of the crop
     /// window.
     ///
-    /// Albedo and normals are denoised first, each alone, and then guide the denoising of the radiance. The
-    /// library's smaller network (quality *balanced*) denoises them, because they have little noise; it
+    /// Albedo and normals are denoised first, each alone, and then guide the denoising of the radiance.
+    /// Because they have little noise, the library's smaller network (quality *balanced*) denoises them; this
     /// changes the picture's error by 2 % at most. `threads` is the maximum number of threads; `None` for one
     /// per core.
     ///

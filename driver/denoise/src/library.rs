@@ -35,7 +35,7 @@ pub(crate) enum Quality {
 
 /// Input of a filter.
 pub(crate) struct Input<'a> {
-    /// Name of each image in the library, and its pixels.
+    /// Name of each image, such as `albedo`, as the library expects it, and the image's pixels.
     pub(crate) images: &'a [(&'a str, &'a [[f32; 3]])],
     /// Names of boolean parameters that are true.
     pub(crate) switches: &'a [&'a str],

@@ -14,14 +14,14 @@ const SHARE_OF_DETAIL: f32 = 1.0 / 64.0;
 /// Distance from the bounding box of all detail up to which photons are stored, relative to the size of this
 /// box.
 const SIZES_AROUND: f32 = 256.0;
-/// Maximum distance of the detail and of the ground's corners from the ground's plane, relative to the
-/// distance around the detail up to which photons are stored. Of the light that the ground reflects to the
-/// detail, at most 1 / 2^12 comes from beyond that distance.
+/// Maximum distance of the detail and of the ground's corners from the ground's plane, divided by the
+/// distance from the detail up to which photons are stored. At most 1 / 2^12 of the light that the ground
+/// reflects to the detail then comes from places without photons.
 const MAX_HEIGHT: f32 = 1.0 / 64.0;
 /// Maximum number of triangles of the ground, before they are split.
 const MAX_GROUND: usize = 1024;
-/// Minimum distance from the bounding box of all detail up to which photons are stored, relative to the
-/// scene's size. Depths, in cells of the photon grid, then fit 64 bits for cameras within the scene.
+/// Minimum of the distance from the detail up to which photons are stored, relative to the scene's size.
+/// Depths, in cells of the photon grid, then fit 64 bits for cameras within the scene.
 const MIN_SHARE: f32 = 1.0 / 8192.0;
 /// Margin for rounding beyond the scene's bounds, relative to the distance from the detail up to which
 /// photons are stored.
@@ -30,9 +30,9 @@ const MARGIN: f32 = 1e-3;
 /// are stored.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
 
-/// Returns the box in which photons are stored, around all detail of a scene and its surroundings: its lower
-/// and upper corner, metres. Returns `None` unless the box is less than half as large as the scene's bounding
-/// box and all larger triangles lie in one plane ground.
+/// Returns the box in which photons are stored: its lower and upper corner, metres. It contains all detail of
+/// a scene and the surroundings. Returns `None` unless the box is less than half as large as the scene and
+/// all triangles that are no detail lie in one plane.
 pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
     let (lower, upper) = scene.bounds();
     let size = (upper - lower).max_element();

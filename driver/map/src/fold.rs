@@ -67,7 +67,7 @@ impl<L, B: Copy> Tree<L, B> {
 
 /// Returns two arrays. Entry `i` of the first is the least cost of two trees that are represented by at most
 /// `i + 1` children in all (infinite for `i = 0`). Entry `i` of the second is the number of these children
-/// that belong to the first tree. Of equally cheap numbers it is the smallest.
+/// that belong to the first tree. If several numbers are equally cheap, it is the smallest.
 fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHILDREN], [u8; NODE_CHILDREN]) {
     // The arrays are longer than the result, so that the inner loop always has [`NODE_CHILDREN`] iterations.
     let (mut costs, mut first) = ([f32::INFINITY; 2 * NODE_CHILDREN], [0_u32; 2 * NODE_CHILDREN]);

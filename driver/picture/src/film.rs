@@ -306,7 +306,7 @@ impl Film {
         Some(added)
     }
 
-    /// Number of pixels in the crop window that were never written.
+    /// Number of pixels in the crop window that are not written.
     pub fn missing(&self) -> usize {
         self.missing
     }
@@ -355,7 +355,6 @@ impl Film {
     }
 }
 
-/// Encodes sums into a record.
 fn store(sums: &PixelSums, record: &mut [u8]) {
     let mut at = 0;
     sums.write(&mut |bytes| {

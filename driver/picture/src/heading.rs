@@ -35,7 +35,7 @@ pub enum HeadingFault {
     /// The file is not of this kind, in any version.
     #[error("the file is of another kind")]
     Foreign,
-    /// The file is of this kind, but has the other version that the error contains.
+    /// The file is of this kind, but has another version, which the error contains.
     #[error("the file is of version {0}")]
     Version(u32),
     /// The heading is truncated or damaged. The text describes how.

@@ -5,8 +5,8 @@ use photoncard_shared::message::{
     FrameParameters, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
 };
 
-/// Binary logarithm of the mean light per sample above which a pixel is dazzling, in the unit of sums: 2^-40
-/// radiance units.
+/// Binary logarithm of the mean light per sample above which a pixel is dazzling. The unit of the light is
+/// that of the sums, 2^-40 radiance units.
 const DAZZLING_SAMPLE: u32 = 40 + 16;
 /// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the greatest sum.
 const DAZZLING: i64 = 1 << 61;

@@ -196,7 +196,6 @@ pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_png(&bytes))
 }
 
-/// Encodes a PNG file with text chunks.
 fn encode_png(
     [width, height]: [u32; 2],
     pixels: &[u8],

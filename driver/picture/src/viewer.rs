@@ -11,6 +11,6 @@ pub trait Viewer: TileSink {
     /// is shown.
     fn failure(&self) -> Option<Box<dyn Error>>;
 
-    /// Shows the pixels of the complete film that the viewer has not shown yet, in bounded time.
+    /// Shows those pixels of the complete film that are not shown yet. Returns in bounded time.
     fn finish(&self, film: &Film);
 }

@@ -24,7 +24,7 @@ fn value(x: u32, y: u32) -> PixelValue {
     }
 }
 
-/// Format whose units suit the values of these tests, with room for a dazzling light.
+/// Format whose units suit the values of these tests.
 const FORMAT: SumFormat = SumFormat {
     samples: 1,
     probes: 0,

@@ -48,8 +48,8 @@ impl CardAddress {
         Self::Emulated { kind, chips, memory: kind.budget().dram_bytes }
     }
 
-    /// Applies `change` to the kind of emulated chips, and sets their memory to that of the new kind. The
-    /// address of a remote card does not change.
+    /// Applies `change` to the kind of emulated chips, and sets their memory to the memory of the new kind.
+    /// The address of a remote card does not change.
     #[must_use]
     pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
         match self {
@@ -87,8 +87,8 @@ impl CardAddress {
         }
     }
 
-    /// Name that errors give to card number `index` of a render, which is at this address. The name of a
-    /// remote card includes the address.
+    /// Name of card number `index` of a render in error messages. The name of a remote card includes this
+    /// address.
     pub(super) fn name_of(&self, index: usize) -> String {
         match self {
             Self::Emulated { .. } => format!("card {index}"),

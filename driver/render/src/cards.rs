@@ -27,16 +27,16 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage, TileLines};
 
-/// Maximum pause between renders. After a longer one, remote cards are greeted again, because a card may
-/// close a silent link.
+/// Maximum pause between renders without a new greeting. After a longer pause, remote cards are greeted
+/// again, because a card may close a silent link.
 const MAX_REST: Duration = Duration::from_secs(5);
 
 /// Cards that answered the greeting.
 pub(super) struct Cards {
     set: CardSet,
     cards: Vec<(String, GreetedCard)>,
-    /// Emulated cards that were left out of the last picture because of their budget. They may fit the next
-    /// picture.
+    /// Emulated cards that were left out of the last picture because of their budget. They are checked again
+    /// for the next picture.
     left_out: Vec<(String, GreetedCard)>,
     /// Names of the cards that the observer already knows to be left out.
     known: Vec<String>,
@@ -125,9 +125,9 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Gives emulated cards into which nothing was loaded the card image by reference, instead of sending it
-    /// over their links. If the image is not kept from earlier, the first card is loaded over its link, so
-    /// that statistics count one loading. With injected faults, all cards are loaded over their links.
+    /// Gives the card image by reference to emulated cards with empty memory, instead of sending it over
+    /// their links. If the image is new, the first card is still loaded over its link, so that statistics
+    /// count one loading. With injected faults, all cards are loaded over their links.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
         let is_faulty = self.set.faults.is_some();
         for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
@@ -269,8 +269,8 @@ impl Cards {
             // All cards fail alike: the setting is at fault.
             return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
         }
-        // If too few cards are left, the error of the last card without enough capacity is the error of the
-        // picture, even if it was reported before.
+        // If too few cards are left, the picture fails with the error of the last card that was left out,
+        // even if it was reported before.
         let has_enough = self.cards.len() >= needed;
         let misfits = misfits.into_iter().filter(|(name, _)| !has_enough || !self.known.contains(name));
         let misfits = misfits.map(|(name, error)| (name, CardError::of_budget(&error)));

@@ -98,8 +98,8 @@ impl Crew<'_> {
         }))
     }
 
-    /// Tells the threads of all cards to stop because of the scheduler's error. Returns it as an error of the
-    /// render.
+    /// Tells the threads of all cards to stop because of the error `error` of the scheduler. Returns the
+    /// corresponding error of the render.
     pub(super) fn end(&self, error: SchedulerError) -> RenderError {
         let name = |source: &Source| match *source {
             Source::Card(card) => self.names[card].clone(),

@@ -17,7 +17,7 @@ pub(super) struct GreetedCard {
     pub(super) card: OpenCard,
     pub(super) session: Session,
     pub(super) budget: Budget,
-    /// Bytes of the link that the statistics of earlier renders have already counted.
+    /// Bytes transferred over the link that the statistics of earlier renders include.
     pub(super) counted: LinkBytes,
     /// Tiles of the last picture that this card, and no other, rendered.
     pub(super) tiles: Vec<Tile>,
@@ -132,8 +132,8 @@ pub(super) fn greet_port(
     }
 }
 
-/// Random number that identifies a session. It distinguishes the session from earlier ones whose frames may
-/// still arrive. Two numbers are equal with probability 2^-32.
+/// Random number that identifies a session, because frames of earlier sessions may still arrive. Two numbers
+/// are equal with probability 2^-32.
 fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32

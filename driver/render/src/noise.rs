@@ -8,7 +8,7 @@
 //! Independent samples have `r = 1/2`. A stratified sequence has a lower `r`, down to `1/4` for edges and
 //! smooth light (Owen 1997), and lower with few samples than with many. The decrease is uneven: the ratios of
 //! successive `D_n` are 0.24 to 0.69, and some numbers of samples happen to be better than others. One ratio
-//! for all pictures is closer to the truth than ratios measured in each.
+//! for all pictures is more accurate than a ratio measured in each picture.
 
 use photoncard_picture::film::Film;
 
@@ -73,7 +73,7 @@ impl NoiseEstimate {
     }
 
     /// Number of samples to add so that the noise is at most `aim`. `None` before there is an estimate, or if
-    /// even twice the samples of the last doubling do not suffice.
+    /// even twice `Self::samples` do not suffice.
     pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
         if self.noise()? <= aim {
             return Some(0);

@@ -37,7 +37,8 @@ pub trait Observer: Sync {
     /// Reports that `done` of `total` tiles were taken over from an earlier render.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Reports that finished tiles are in the partial file. If the render ends early, it can be resumed.
+    /// Reports that the partial file has finished tiles, from which a later render can resume if this one
+    /// ends early.
     fn kept(&self) {}
 
     /// Reports that a card was lost or given up. The other cards render its tiles.

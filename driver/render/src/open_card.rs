@@ -16,7 +16,7 @@ use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, Tile
 /// Port at the host's end of the link to a remote card.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
 
-/// Connection to a card, with the injector of faults into its line if the settings ask for faults.
+/// Connection to a card, with a fault injector for its link if the settings ask for injected faults.
 pub(super) struct OpenCard {
     connection: Connection,
     injector: Option<FaultInjector>,
@@ -79,7 +79,8 @@ impl OpenCard {
         }
     }
 
-    /// Takes the handle by which an empty emulated card can get a card image by reference.
+    /// Takes the handle through which an emulated card with empty memory can get a card image by reference.
+    /// Returns `None` from the second call on, for a modelled memory, and for a remote card.
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
             Connection::Emulated(card) => card.take_empty_memory(),
@@ -100,8 +101,8 @@ impl OpenCard {
         }
     }
 
-    /// Ends an emulated card, or closes the link to a remote one. Returns traffic and trace of a modelled
-    /// memory.
+    /// Ends an emulated card, or closes the link to a remote one. Returns the traffic and the trace of the
+    /// card's memory; `None` if the memory is not modelled.
     pub(super) fn finish(self) -> Option<MemoryRecord> {
         match self.connection {
             Connection::Emulated(card) => card.finish(),
@@ -158,7 +159,7 @@ fn boxed(port: impl Port + Send + 'static) -> BoxedPort {
 pub(super) const WAIT: Duration = Duration::from_millis(4);
 
 /// Sends the outgoing bytes of a session to a port, then passes received bytes to the session. Waits for
-/// bytes for at most [`WAIT`]. `slowest` is the argument of [`Session::tick`].
+/// bytes for at most [`WAIT`]. `slowest` is the time limit per ray or gather, seconds, for [`Session::tick`].
 pub(super) fn exchange(
     session: &mut Session,
     port: &mut impl Port,
@@ -205,9 +206,9 @@ pub(super) fn reopen(
     Ok(None)
 }
 
-/// Tries to connect once, on a separate thread, and sends the port, or `None` on failure, to the returned
-/// receiver. Resolving or connecting can take seconds, for which an ending render does not wait. The port is
-/// closed if the receiver is gone.
+/// Tries to connect once, on a separate thread. Sends the port, or `None` on failure, to the returned
+/// receiver. The attempt can take seconds. A render can end meanwhile: it drops the receiver, and the port is
+/// then closed.
 fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {

@@ -25,8 +25,9 @@ pub(super) struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// Opens the outputs. Tiles of a resumed render are written into the film and shown. If the file has
-    /// samples with all their tiles, their film replaces `base`, and `film` has the remaining samples.
+    /// Opens the outputs. Tiles of a resumed render are written into the film and shown. If the file has all
+    /// tiles of the first samples, the film of these samples replaces `base`, and `film` gets the remaining
+    /// samples.
     ///
     /// # Errors
     /// If the file of finished tiles cannot be read, or is not the file of this picture.
@@ -39,8 +40,8 @@ impl<'a> Outputs<'a> {
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
             let mut identity = settings.identity(scene);
-            // The file may have any number of samples. With an irradiance cache, pixels depend on the planned
-            // number.
+            // The file may have another number of samples. With an irradiance cache, pixels depend on the
+            // planned number of samples, which must be equal.
             identity.remove("spp");
             if settings.integrator.irradiance_error.is_some() {
                 identity.insert("planned-spp".to_owned(), settings.integrator.planned().into());

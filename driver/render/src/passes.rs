@@ -27,8 +27,8 @@ const PLANNED_SHARE: f64 = 0.95;
 /// per pixel end them in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time limit of the render. The first pass may exceed it. The second may, too, if a card has no room for
-    /// irradiance records.
+    /// Time limit of the render. The first pass may exceed the limit, and so may the second if a card has no
+    /// room for irradiance records.
     pub time: Option<Duration>,
     /// Noise limit: estimated root mean square standard error of pixels, relative to the mean of the picture.
     pub noise: Option<f64>,
@@ -61,8 +61,9 @@ pub enum Ending {
 
 impl Renderer {
     /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as in
-    /// [`Self::render_chosen`]. Their number of samples becomes the planned number. The picture equals, bit
-    /// for bit, that of a single render with the same number of samples and the same planned number.
+    /// [`Self::render_chosen`], but the chosen number of samples only becomes
+    /// [`Integrator::planned_samples`]. The picture equals, bit for bit, that of a single render with the
+    /// same number of samples and the same planned number.
     ///
     /// # Errors
     /// As [`Self::render_chosen`], if the first pass fails.
@@ -153,11 +154,11 @@ fn next_pass(
     }
 }
 
-/// Model of the time of passes: a constant, plus a time in proportion to the samples.
+/// Model of the time of a pass: a constant, plus a time in proportion to the number of samples.
 #[derive(Default)]
 struct Pace {
-    /// Number of samples and seconds of the last two passes, the last one second. A first pass that gathers
-    /// irradiance records for all passes is left out.
+    /// Numbers of samples and times, seconds, of the last two passes; the later pass has index 1. A first
+    /// pass that gathers irradiance records for all passes is left out.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -171,8 +172,8 @@ impl Pace {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
-        // Bounds of the time per sample: the time of the last pass divided by its samples, and a fourth of
-        // that.
+        // The time per sample is at most the time of the last pass divided by its samples, and at least a
+        // fourth of that maximum.
         let most = time / samples;
         let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
         let fixed = time - each * samples;

@@ -53,8 +53,8 @@ impl Renderer {
         Self { cards: None, kept: Some(kept) }
     }
 
-    /// Renders a picture of a scene. If only the camera differs from the last picture, its triangles and
-    /// texels are not read.
+    /// Renders a picture of a scene. If only the camera differs from the last picture, triangles and texels
+    /// of the scene are not read.
     ///
     /// # Errors
     /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
@@ -200,7 +200,7 @@ fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     }
 }
 
-/// Returns the open cards if they are those of the settings, otherwise newly connected ones.
+/// Returns the open cards if the settings have the same cards, otherwise newly connected cards.
 fn connected<'c>(
     cards: &'c mut Option<Cards>,
     settings: &RenderSettings,

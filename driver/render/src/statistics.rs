@@ -70,8 +70,8 @@ pub struct Statistics {
     pub records: u64,
     /// Number of irradiance records reused from an earlier pass.
     pub kept_records: u64,
-    /// Number of samples with interpolated irradiance, divided by that of samples that see a surface with a
-    /// Lambertian part.
+    /// Number of samples with interpolated irradiance, divided by the number of samples that see a surface
+    /// with a Lambertian part.
     pub interpolated_share: f64,
     /// Number of photons whose distance was computed.
     pub photons_tested: u64,
@@ -164,8 +164,8 @@ impl Statistics {
     }
 }
 
-/// Number of photons in the map of a card image. It is the requested number `count` if the map has room for
-/// it; otherwise the photons are counted.
+/// Number of photons in the map of a card image. If the leaves and nodes have room for the requested number
+/// `count`, it is `count`. Otherwise the photons in them are counted.
 fn photons(count: u64, prepared: &Prepared) -> u64 {
     let leaves = prepared.image.section(SectionKind::PhotonLeaves);
     let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
@@ -180,8 +180,9 @@ fn photons(count: u64, prepared: &Prepared) -> u64 {
 /// Numbers of rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// Number of eye rays: two per path in pixels with gather rays and one in others, more for surfaces seen
-    /// by specular reflection or refraction, and one per visited lattice point of the irradiance cache.
+    /// Number of eye rays: two per path in pixels with gather rays, one per path in other pixels, further
+    /// ones for surfaces seen by specular reflection or refraction, and one per visited lattice point of the
+    /// irradiance cache.
     pub eye: u64,
     /// Number of shadow rays.
     pub shadow: u64,
@@ -189,7 +190,7 @@ pub struct Rays {
     pub gather: u64,
     /// Number of rays that survey the surroundings of irradiance records.
     pub survey: u64,
-    /// Number of rays from specular surfaces that continue rays of the other kinds, except shadow rays.
+    /// Number of rays that continue eye, gather or survey rays after specular reflection or refraction.
     pub specular: u64,
 }
 

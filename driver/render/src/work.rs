@@ -34,7 +34,8 @@ pub(super) struct Work<'a> {
     pub(super) frame: &'a FrameParameters,
     /// All tiles of the picture.
     pub(super) tiles: Vec<Tile>,
-    /// Film of the picture, one of the sinks. It already contains the tiles taken over from a resumed render.
+    /// Film of the picture, which is also one of the sinks. It already contains the tiles of a resumed
+    /// render.
     pub(super) film: &'a Mutex<Film>,
     /// Destinations of finished tiles.
     pub(super) sinks: Vec<&'a dyn TileSink>,
@@ -45,7 +46,6 @@ pub(super) struct Work<'a> {
 /// Outcome of the work of cards.
 #[derive(Default)]
 pub(super) struct Outcome {
-    /// Counters of the work.
     pub(super) counters: Counters,
     /// Bytes transferred over the link of each card.
     pub(super) links: Vec<LinkBytes>,
@@ -56,9 +56,9 @@ pub(super) struct Outcome {
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were taken over, verified, repeated or revoked.
     pub(super) tiles: TileCounts,
-    /// Names of cards with dazzling tiles that no other card verified, and the number of these tiles. The
-    /// light of a dazzling tile is far above that of the scene's surfaces. Tiles taken over from a file count
-    /// for [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
+    /// Names of cards with dazzling tiles that no other card verified, each with the number of its tiles. The
+    /// light of a dazzling tile is far above that of the scene's surfaces. Tiles taken over from a file are
+    /// listed under the name [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
     pub(super) dazzling: Vec<(String, usize)>,
     /// Error that ended the work. The other fields describe the work until then.
     pub(super) failure: Option<RenderError>,

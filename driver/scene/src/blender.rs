@@ -19,7 +19,7 @@ pub(super) const NO_LIGHT: &str = "tick Include > Data > Punctual Lights in Blen
 pub(super) const NO_CAMERA: &str = "tick Include > Data > Cameras in Blender's export dialog, or pass \
      export_cameras=True to export_scene.gltf";
 
-/// Returns whether a file with this `asset.generator` is of Blender's exporter.
+/// Returns whether `asset.generator` names Blender's exporter.
 pub(super) fn is_exporter(generator: Option<&str>) -> bool {
     generator.is_some_and(|name| name.starts_with(NAME))
 }
@@ -27,7 +27,7 @@ pub(super) fn is_exporter(generator: Option<&str>) -> bool {
 /// Returns the units of the lights in a file with this `asset.generator`; `None` if the file is not of
 /// Blender's exporter.
 ///
-/// The exporter's *Lighting Mode* is not in the file: it is taken to be the default, *Standard*.
+/// The file does not state the exporter's *Lighting Mode*; the default, *Standard*, is assumed.
 pub(super) fn light_units(generator: Option<&str>) -> Option<LightUnits> {
     let rest = generator?.strip_prefix(NAME)?;
     let is_early = version(rest).is_some_and(|version| version < PHOTOMETRIC_SINCE);
@@ -40,8 +40,8 @@ fn version(text: &str) -> Option<(u32, u32)> {
     Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
 }
 
-/// Cosine of the inner cone angle at which glTF's spot falloff has the flux of Blender's. Arguments are the
-/// angles of the inner and outer cone that the exporter wrote, radians, and the cosine of the outer one.
+/// Returns the cosine of the inner cone angle at which glTF's spot falloff emits the same flux as Blender's.
+/// `inner` and `outer` are the cone angles in the file, radians; `outer_cosine` is the cosine of `outer`.
 ///
 /// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine from 0
 /// at `cos outer` to 1 at `cos outer + w`, where `w = blend (1 - cos outer)`. Its integral over the width `w`

@@ -22,8 +22,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Width and height, pixels, of a picture with the aspect ratio that the file states; `None` if it states
-    /// none. The longer side has `side` pixels, the shorter one at least 1.
+    /// Width and height, pixels, of a picture with the aspect ratio that the file states; `None` if the file
+    /// states none. The longer side has `side` pixels, the shorter one at least 1.
     pub fn size(&self, side: u32) -> Option<(u32, u32)> {
         let aspect = self.aspect?;
         let shorter = |ratio: f32| ((side as f32 * ratio + 0.5) as u32).clamp(1, side);

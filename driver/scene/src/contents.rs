@@ -69,12 +69,12 @@ pub enum Concern {
     OtherCameras,
     /// Animations, which a picture of the scene without animation does not use.
     Animations,
-    /// Environment light of the file. A picture may use that of another file instead.
+    /// Environment light of the file. A picture may use the environment of another file instead.
     Environment,
 }
 
 impl SceneContents {
-    /// Triangles of the scene as they are stored: those in world space, then those of the groups.
+    /// Stored triangles of the scene: those in world space, then those of each group once.
     pub fn stored_triangles(&self) -> impl Iterator<Item = &Triangle> {
         self.triangles.iter().chain(self.groups.iter().flatten())
     }

@@ -100,7 +100,7 @@ impl Box3 {
         Self { low: a.min(b).min(c) - room, high: a.max(b).max(c) + room }
     }
 
-    /// Box between two corners, enlarged like that of a triangle.
+    /// Box from a lower to an upper corner, enlarged by the tolerance of [`SHARED`].
     fn around([low, high]: [Vec3; 2]) -> Self {
         let [low, high] = [low, high].map(DVec3::from);
         let room = SHARED * f64::from(f32::EPSILON) * low.abs().max(high.abs()).max_element();
@@ -129,7 +129,7 @@ impl Lamp {
         Self { index, triangle: *triangle, bounds: Box3::of(triangle) }
     }
 
-    /// Returns whether `surface` lies in the lamp's plane and overlaps the lamp by more than an edge.
+    /// Returns whether `surface` lies in the lamp's plane and overlaps the lamp by more than a common edge.
     fn is_covered_by(&self, surface: &Triangle) -> bool {
         let up = normal(&self.triangle);
         let [lamp, surface_corners] =
@@ -148,7 +148,7 @@ impl Lamp {
     }
 }
 
-/// Returns whether two triangles overlap by more than `distance` along each normal of their edges (the
+/// Returns whether two triangles overlap by more than `distance` along the normal of every edge (the
 /// separating axis theorem).
 fn overlap(one: &[DVec2; 3], other: &[DVec2; 3], distance: f64) -> bool {
     let is_apart = |along: DVec2| {
@@ -184,7 +184,7 @@ enum Content {
 const LEAF: usize = 4;
 
 impl Tree {
-    /// Builds the hierarchy of at least one lamp. Nodes are split at the median along their longest side.
+    /// Builds a hierarchy of `lamps` (at least one). Nodes are split at the median along their longest side.
     fn new(mut lamps: Vec<Lamp>) -> Self {
         let bounds = lamps.iter().map(|lamp| lamp.bounds).reduce(Box3::union);
         let bounds = bounds.unwrap_or(Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY });
@@ -198,7 +198,7 @@ impl Tree {
         Self { bounds, content: Content::Halves(Box::new([Self::new(lamps), Self::new(upper)])) }
     }
 
-    /// Returns whether the box of a lamp overlaps `bounds`.
+    /// Returns whether the bounding box of any lamp overlaps `bounds`.
     fn touches(&self, bounds: &Box3) -> bool {
         self.bounds.overlaps(bounds)
             && match &self.content {
@@ -207,7 +207,7 @@ impl Tree {
             }
     }
 
-    /// Indices of the lamps that `surface` overlaps in their plane.
+    /// Indices of the lamps that lie in the plane of `surface` and overlap it.
     fn overlapping(&self, surface: &Triangle) -> impl Iterator<Item = usize> {
         let mut found = Vec::new();
         self.find(surface, &Box3::of(surface), &mut found);

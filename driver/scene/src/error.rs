@@ -131,7 +131,7 @@ pub enum SceneError {
         /// Excerpt of the text around the fault.
         #[source_code]
         text: Arc<Excerpt>,
-        /// Position of the fault in the text.
+        /// Position of the fault in the excerpt.
         #[label("here")]
         at: SourceSpan,
     },
@@ -264,7 +264,7 @@ pub enum SceneError {
         available: u64,
     },
 
-    /// Error of memory that a step of loading needs and the system refuses.
+    /// Error of a step of loading for which the system refuses the memory.
     #[error("{}: {step} takes {bytes} bytes of memory, which the system does not give", file.display())]
     #[diagnostic(code(scene::memory), help("simplify the scene, or {}", allocation::REMEDY))]
     Memory {
@@ -272,7 +272,7 @@ pub enum SceneError {
         file: PathBuf,
         /// Step of loading that takes the memory.
         step: &'static str,
-        /// Number of bytes.
+        /// Memory that the step needs, bytes.
         bytes: u64,
     },
 
@@ -401,7 +401,7 @@ pub enum SceneError {
 }
 
 impl SceneError {
-    /// Creates the error of memory that a step of loading needs and the system refuses.
+    /// Creates the error of a step of loading for which the system refuses the memory.
     pub(crate) fn memory(file: &Path, step: &'static str, OutOfMemory { bytes }: OutOfMemory) -> Self {
         Self::Memory { file: file.to_owned(), step, bytes }
     }

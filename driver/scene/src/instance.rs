@@ -16,20 +16,19 @@ pub struct Instance {
     pub to_group: Rows,
 }
 
-/// Minimum and maximum of a transform's determinant at which it has an inverse in
-/// single precision.
+/// Minimum and maximum absolute determinant of a transform that can be inverted in single precision.
 const DETERMINANTS: [f64; 2] = [1e-18, 1e18];
 
 impl Instance {
-    /// Returns whether a transform mirrors; `None` if no instance can have it, as it is too close to one
-    /// without an inverse.
+    /// Returns whether a transform mirrors; `None` if it cannot be inverted in single precision, so that no
+    /// instance can have it.
     pub(crate) fn mirrors(to_world: &DMat4) -> Option<bool> {
         let [least, greatest] = DETERMINANTS;
         let determinant = DMat3::from_mat4(*to_world).determinant();
         (least..greatest).contains(&determinant.abs()).then_some(determinant < 0.0)
     }
 
-    /// Creates an instance; `None` if the transform mirrors, or is too close to one without an inverse.
+    /// Creates an instance; `None` if the transform mirrors or cannot be inverted in single precision.
     pub fn new(group: u32, to_world: &DMat4) -> Option<Self> {
         let mirrors = Self::mirrors(to_world)?;
         let to_world = rows(to_world);
@@ -39,7 +38,8 @@ impl Instance {
         (is_finite && !mirrors).then_some(Self { group, to_world, to_group })
     }
 
-    /// Lower and upper corner of the box around the instance, metres, given those of its group.
+    /// Lower and upper corner of the box around the instance, metres, computed from the corners of its
+    /// group's box in the group's space.
     pub fn bounds(&self, [lower, upper]: [Vec3; 2]) -> [Vec3; 2] {
         let corner = |which: usize| {
             let side = |axis: usize| if which >> axis & 1 == 0 { lower[axis] } else { upper[axis] };
@@ -48,14 +48,15 @@ impl Instance {
         (1..8).map(corner).fold([corner(0); 2], |[low, high], corner| [low.min(corner), high.max(corner)])
     }
 
-    /// Factor by which the transform enlarges areas: the mean over areas perpendicular to the axes.
+    /// Factor by which the transform enlarges areas: the mean over three areas, each perpendicular to one
+    /// axis of the group's space.
     pub fn area_factor(&self) -> f64 {
         let column = |axis: usize| DVec3::from(self.to_world.map(|row| f64::from(row[axis])));
         let [x, y, z] = [0, 1, 2].map(column);
         [y.cross(z), z.cross(x), x.cross(y)].map(DVec3::length).iter().sum::<f64>() / 3.0
     }
 
-    /// Attributes of a copy of a triangle of the group.
+    /// Transforms the normals in a triangle's attributes from the group's space to the world.
     pub(crate) fn attributes(&self, attributes: &VertexAttributes) -> VertexAttributes {
         let placed = |normal: Vec3| placed_normal(&self.to_group, normal.to_array()).into();
         let normals =

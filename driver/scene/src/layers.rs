@@ -34,7 +34,7 @@ pub struct Layers {
 pub struct NormalMap {
     /// Index of the texture in [`Scene::textures`](super::SceneContents::textures).
     pub texture: u32,
-    /// Scale of the x and y of the map's normals.
+    /// Factor of the x and y components of the map's normals.
     pub scale: f32,
 }
 

@@ -109,8 +109,9 @@ impl Scene {
         self
     }
 
-    /// Creates a scene without triangles that has these cameras and this offset, and returns the given values
-    /// instead of computing them. `checksums` are the results of `checksum` and `checksum_without_cameras`.
+    /// Creates a scene that has cameras and an offset, but no triangles. Its methods return the given values:
+    /// `checksum` and `checksum_without_cameras` those in `checksums`, [`Self::is_specular`] the last
+    /// argument.
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,
@@ -144,8 +145,8 @@ impl Scene {
         self.known.bulk.get_or_init(|| self.contents.bulk_checksum()).clone()
     }
 
-    /// Returns the notices without those about subjects that a picture does not use. `uses` returns whether
-    /// the picture uses a subject.
+    /// Returns the notices that matter to a picture: all except those about subjects that the picture does
+    /// not use. `uses` returns whether the picture uses a subject.
     pub fn notices_on(&self, uses: impl Fn(Concern) -> bool) -> Vec<&str> {
         let is_idle =
             |index: usize| self.concerns.iter().any(|&(notice, concern)| notice == index && !uses(concern));
@@ -153,8 +154,8 @@ impl Scene {
         notices.filter(|(index, _)| !is_idle(*index)).map(|(_, notice)| &**notice).collect()
     }
 
-    /// Converts a position from the scene's coordinates to the file's, metres. If the offset is 0, the result
-    /// has the argument's shortest decimal form.
+    /// Converts a position from the scene's coordinates to the file's, metres. If the offset is 0, each
+    /// coordinate of the result prints as the argument's does.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
         // Takes the double-precision number that is nearest to the coordinate's shortest decimal form.
         let decimal = |value: f32| value.to_string().parse().unwrap_or(f64::from(value));
@@ -167,7 +168,8 @@ impl Scene {
     }
 
     /// Lower and upper corner of a box around the scene, metres; both zero for a scene without triangles. It
-    /// is the smallest one without instances, of which it contains the boxes around their groups' boxes.
+    /// is the smallest box around the triangles in world space and, for each instance, the transformed box of
+    /// its group.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let all = triangle::bounds_of(&self.triangles)
             .into_iter()
@@ -276,7 +278,8 @@ impl Scene {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
 
-    /// Returns whether the material's GGX lobe is narrow at one texel at least. Rays follow a narrow lobe.
+    /// Returns whether the material's GGX lobe is narrow at one texel at least. Reflection by a narrow lobe
+    /// is sampled with rays, not estimated from photons.
     pub fn has_narrow_lobe(&self, material: &Material) -> bool {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }

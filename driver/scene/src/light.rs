@@ -28,7 +28,7 @@ pub enum PunctualKind {
     Spot {
         /// Position of the apex, metres.
         position: Vec3,
-        /// Unit vector of the cone's axis, in the direction of the light.
+        /// Unit vector of the cone's axis, in the direction in which light travels.
         direction: Vec3,
         /// Cosine of the inner cone angle, within which the intensity is full; above `outer_cosine`.
         inner_cosine: f32,

@@ -12,7 +12,7 @@ const EFFICACY: f32 = 683.0;
 /// lights in cd and lx and emission in cd/m^2; their pictures are brighter by a constant factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
-    /// Chosen by the exporter in `asset.generator`: [`Photometric`](Self::Photometric) for Blender's,
+    /// Units of the exporter that `asset.generator` names: [`Photometric`](Self::Photometric) for Blender's,
     /// [`Watts`](Self::Watts) for Blender's before 3.4, [`Radiometric`](Self::Radiometric) for others.
     #[default]
     Auto,

@@ -130,7 +130,7 @@ impl Material {
     }
 
     /// Returns whether the material focuses light: it is a mirror or transmits light, has a coat or a sheen,
-    /// or has a narrow lobe. `texel` is the minimum of its roughness texture, 1 without one.
+    /// or has a narrow lobe. `texel` is the minimum of the roughness texture, or 1 without a texture.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
         if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {
             return true;
@@ -154,8 +154,8 @@ impl Material {
         }
     }
 
-    /// Returns whether the material has a narrow lobe at some texel. `texel` is the minimum of its roughness
-    /// texture, 1 without one.
+    /// Returns whether the material has a narrow lobe at some texel. `texel` is the minimum of the roughness
+    /// texture, or 1 without a texture.
     pub(super) fn has_narrow_lobe(&self, texel: f32) -> bool {
         matches!(self.reflection, Reflection::MetallicRoughness { roughness, .. } if is_narrow(roughness * texel))
     }
@@ -198,7 +198,8 @@ impl Material {
     }
 }
 
-/// Returns whether a GGX lobe of this perceptual roughness is narrow enough for rays to follow it.
+/// Returns whether a GGX lobe of this perceptual roughness is narrow: `roughness^2` is below
+/// [`NARROW_ALPHA`].
 fn is_narrow(roughness: f32) -> bool {
     roughness * roughness < NARROW_ALPHA
 }

@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-/// A value of a material that is out of its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
     pub(super) property: Property,

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-/// Resolution of a triangle's angle around an edge, steps per radian. Triangles at the same step count as
-/// coplanar.
+/// Steps per radian to which the angle of a triangle around an edge is rounded. Triangles of equal rounded
+/// angles are taken as coplanar.
 const ANGLE_STEPS: f32 = 1e4;
 
 /// A connected part of a surface.
@@ -29,9 +29,9 @@ struct Side {
     is_forward: bool,
 }
 
-/// Splits triangles into connected parts, in the order of their first triangles. Two triangles that alone
-/// share an edge are connected. If more share it, as where solids touch, neighbours around the edge are
-/// connected if the inside of a solid lies between them.
+/// Splits triangles into connected parts, in the order of their first triangles. Two triangles with a common
+/// edge are connected if no third triangle has this edge. If more triangles share an edge, as where solids
+/// touch, two neighbours around the edge are connected if the inside of a solid lies between them.
 pub fn parts(triangles: &[[Vec3; 3]]) -> Vec<Part> {
     let mut sides: Vec<Side> =
         triangles.iter().zip(0..).flat_map(|(corners, index)| sides(corners, index)).collect();
@@ -77,8 +77,8 @@ fn sides(corners: &[Vec3; 3], triangle: u32) -> [Side; 3] {
     })
 }
 
-/// Pairs of neighbouring triangles around an edge whose backs face each other: the inside of a solid lies
-/// between them.
+/// Pairs of triangles that are neighbours around an edge and turn their backs to each other: the inside of a
+/// solid lies between them.
 fn partners(triangles: &[[Vec3; 3]], around: &[Side]) -> impl Iterator<Item = [u32; 2]> {
     let Some(first) = around.first() else { unreachable!("an edge is a triangle's") };
     let [from, to] = first.ends.map(|end| Vec3::from_array(end.map(f32::from_bits)));

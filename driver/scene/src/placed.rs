@@ -1,4 +1,4 @@
-//! Contents of a scene with its instances: extent, numbers, and expansion to triangles.
+//! Instances of a scene: their bounds, triangle counts and areas, and their expansion to triangles.
 
 use glam::Vec3;
 use photoncard_shared::layout::{placed_point, placed_vector};
@@ -17,7 +17,7 @@ impl Scene {
             .filter_map(move |instance| Some((instance, instance.bounds(groups[instance.group as usize]?))))
     }
 
-    /// Number of triangles in the scene, those of all instances included.
+    /// Number of triangles in the scene, including the triangles of every instance.
     pub fn placed_triangles(&self) -> u64 {
         let of_instance = |instance: &Instance| self.groups[instance.group as usize].len() as u64;
         self.triangles.len() as u64 + self.instances.iter().map(of_instance).sum::<u64>()
@@ -33,8 +33,8 @@ impl Scene {
         of(&self.triangles) + self.instances.iter().map(of_instance).sum::<f64>()
     }
 
-    /// Returns for each material whether its triangles must be in world space, because lights, caustics and
-    /// the form of glass are found there: it emits, focuses or transmits light.
+    /// Returns for each material whether it emits, focuses or transmits light. Triangles of such a material
+    /// must be in world space, because lights, caustics and solid glass are found there.
     pub(crate) fn copied_materials(&self) -> Vec<bool> {
         let transmits = |material: &Material| match material.reflection {
             Reflection::MetallicRoughness { transmission: Some(Transmission { factor, .. }), .. } => {
@@ -50,14 +50,15 @@ impl Scene {
     }
 
     /// Returns for each group whether its instances must be expanded to triangles: a material of the group
-    /// emits, focuses or transmits light. A file is loaded without such groups, but materials can change.
+    /// emits, focuses or transmits light. The loader makes no such groups, but a setting may change a
+    /// material later.
     pub fn expanded_groups(&self) -> Vec<bool> {
         let copied = self.copied_materials();
         let expands = |group: &Vec<Triangle>| group.iter().any(|triangle| copied[triangle.material as usize]);
         self.groups.iter().map(expands).collect()
     }
 
-    /// The scene with the instances of the chosen groups expanded to triangles in world space.
+    /// Copy of the scene in which the instances of the chosen groups are triangles in world space.
     pub fn expanded(&self, groups: &[bool]) -> Self {
         self.clone().with(|scene| {
             let (expanded, kept) = std::mem::take(&mut scene.instances)
@@ -82,7 +83,7 @@ impl Scene {
 }
 
 impl SceneContents {
-    /// Triangles of an instance in world space, with the attributes of the group's.
+    /// Triangles of an instance in world space. They keep the attribute indices of the group's triangles.
     pub(crate) fn placed(&self, instance: &Instance) -> impl Iterator<Item = Triangle> {
         let to_world = instance.to_world;
         let place = move |vertex: Vec3| placed_point(&to_world, vertex.to_array()).into();
@@ -90,7 +91,7 @@ impl SceneContents {
         group.map(move |triangle| Triangle { vertices: triangle.vertices.map(place), ..*triangle })
     }
 
-    /// Adds the triangles of an instance in world space, with attributes of their own.
+    /// Adds the triangles of an instance in world space, with transformed copies of the group's attributes.
     fn add_triangles(&mut self, instance: &Instance) {
         let placed: Vec<_> = self.placed(instance).collect();
         for mut triangle in placed {

@@ -31,7 +31,7 @@ fn ends_early() -> Fault {
 
 struct Header {
     size: [u32; 2],
-    /// Whether the file's first column is the rightmost one, and whether its first row is the lowest.
+    /// True if the file's first column is the rightmost one, and true if its first row is the lowest.
     flipped: [bool; 2],
     /// Factor by which the stored radiance was multiplied.
     exposure: f32,
@@ -62,8 +62,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     Ok((header.size, texels))
 }
 
-/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. Some
-/// readers add 1/2 to every mantissa; this one does not.
+/// Computes `m 2^(e - 136) / exposure` for three mantissas `m` with a common exponent `e`; `e = 0` is black.
+/// Some readers add 1/2 to every mantissa; this one does not.
 fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];

@@ -15,9 +15,9 @@ pub(crate) fn reduced_size(size: [u32; 2], limit: u32) -> [u32; 2] {
     size.map(|side| side.div_ceil(factor))
 }
 
-/// Reduces an image of size `from` to size `to`. Each new texel is a mean in linear light; each old texel
-/// contributes to one mean. Colour and alpha are averaged separately, as in a GPU's mipmaps, so that the
-/// colour of a texel of alpha 0 counts.
+/// Reduces an image of size `from` to size `to`. Each new texel is the mean, in linear light, of the old
+/// texels within it; each old texel contributes to one mean. Colour and alpha are averaged separately, as in
+/// a GPU's mipmaps, so that the colour of a texel of alpha 0 counts.
 pub(crate) fn reduced(texels: &[[u8; 4]], encoding: Encoding, from: [u32; 2], to: [u32; 2]) -> Vec<[u8; 4]> {
     let code = Code { encoding, srgb: Srgb::new() };
     let [width, _] = from;

@@ -48,8 +48,8 @@ pub(crate) fn bounds_of(triangles: &[Triangle]) -> Option<[Vec3; 2]> {
 /// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexAttributes {
-    /// Unit shading normals of the corners in world space, on the front side. `None` for a flat triangle, and
-    /// if all three equal the geometric normal.
+    /// Unit shading normals of the corners in world space, on the front side. `None` if the triangle has no
+    /// vertex normals, or if all three equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
     /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v
     /// counts from the image's top.

@@ -53,8 +53,8 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// Returns whether the arguments or the scenes cause the error. The command's exit status is then 2
-    /// instead of 1.
+    /// Returns whether the arguments or the scenes cause the error. The exit status of the command is then 2,
+    /// otherwise 1.
     pub fn is_input(&self) -> bool {
         match self {
             Self::NoScene { .. }

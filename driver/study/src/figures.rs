@@ -45,9 +45,9 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     Ok(figures)
 }
 
-/// Writes `figures.csv` into `folder`: the figures `check`, which the function [`check`] measured, the
-/// settings that all points share, and the figures of the studies. At a scale other than the nominal frame's,
-/// the figure `trial` holds the text that says so.
+/// Writes `figures.csv` into `folder`. It contains the figures `check`, which the function [`check`]
+/// measured, the settings that all points share, and the figures of the studies. If the scale is not nominal,
+/// the figure `trial` states this.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -25,7 +25,8 @@ use super::store::PointStore;
 /// Displacement of moving lights, as a fraction of the scene's diagonal.
 pub(crate) const LIGHT_STEP: f32 = 0.01;
 
-/// Times of the host's work for the photon map of one scene, and the bytes that changes of light alter.
+/// Times of the host's work for the photon map of one scene, and numbers of bytes that changes of light
+/// alter.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) struct HostFrame {
     /// Size of the card image, bytes.
@@ -38,8 +39,8 @@ pub(crate) struct HostFrame {
     pub(crate) tracing: f64,
     /// Time to build the map and the other sections of the card image, seconds.
     pub(crate) building: f64,
-    /// Time to measure the maximum radius of gathers, and the fractions of their discs that surfaces fill,
-    /// seconds.
+    /// Time to measure the maximum radius of gathers, and the fraction of each gather's disc that surfaces
+    /// fill, seconds.
     pub(crate) measuring: f64,
     /// Bytes of the card image that each change of the scene's light alters.
     pub(crate) changes: Vec<Changed>,
@@ -63,7 +64,7 @@ pub(crate) enum Change {
     Replaced(f64),
 }
 
-/// Size of the lines of the card image that differ after a change.
+/// Size of the lines of the card image that a change alters, and of all lines.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) struct Changed {
     pub(crate) change: Change,

@@ -1,5 +1,5 @@
-//! Measures points, except those whose results the store has already. Points with the same card image are
-//! measured one after another, so that photons are traced once for all of them.
+//! Measures points whose results are not in the store yet. Points with the same card image are measured one
+//! after another, so that photons are traced once for all of them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ use super::store::PointStore;
 /// Observer of a study's progress, which can stop the study.
 pub trait StudyObserver: Sync {
     /// Reports that `done` of the study's `total` points are finished. In the first call `is_new` is false,
-    /// and `done` is the number of points whose results are in the store. Then there is a call after each
-    /// measured point.
+    /// and `done` is the number of points whose results are in the store. Each later call follows the
+    /// measurement of a point.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
     /// Reports in a sentence why a stored point cannot be used. The point is measured again.
@@ -85,7 +85,7 @@ pub struct Laboratory<'a> {
     /// Card image of the last point, kept for a next point that needs the same image.
     last: Option<LastImage>,
     /// Reference render of the last point with [`Task::Quality`], kept for a next point that needs the same
-    /// one.
+    /// reference.
     reference: Option<SceneReference>,
 }
 
@@ -95,8 +95,7 @@ struct LastImage {
     mapped: MappedImage,
 }
 
-/// A reference render, and what it depends on besides its settings: the name of the scene, and the
-/// assignments to the scene's materials.
+/// A reference render, with the name of the rendered scene and the assignments to the scene's materials.
 struct SceneReference {
     scene: String,
     assignments: Vec<String>,

@@ -58,8 +58,8 @@ pub struct StudyOptions {
     pub scenes: PathBuf,
     /// Folder of the reports.
     pub out: PathBuf,
-    /// True if each report has its own folder in [`Self::out`], and an index page links them. If false,
-    /// reports are written into [`Self::out`] itself.
+    /// True if each report has its own folder in [`Self::out`], with an index page of links to all reports.
+    /// If false, reports are written into [`Self::out`] itself.
     pub is_collection: bool,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,

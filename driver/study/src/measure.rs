@@ -130,8 +130,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) scene: &'a Scene,
     /// Card image of the scene, with its photon map.
     pub(crate) mapped: &'a MappedImage,
-    /// Threads, each of which emulates one chip. Their stacks must be large enough for a chip while it is
-    /// built.
+    /// Threads, each of which emulates one chip. Their stacks must have room for a whole chip, which is built
+    /// there.
     pub(crate) pool: &'a ThreadPool,
     /// Function that returns whether to stop. It is polled before each tile.
     pub(crate) is_stopped: &'a (dyn Fn() -> bool + Sync),

@@ -26,8 +26,8 @@ pub struct Point {
     /// Settings of the render.
     pub settings: RenderSettings,
     /// True to do all gathers of the frame along one Hilbert curve instead of in the order of the settings.
-    /// No chip can hold all gathers of a frame: the traffic along the curve is a bound with which the orders
-    /// of chips are compared.
+    /// No chip can hold all gathers of a frame. The traffic along the curve is a bound for the orders of
+    /// chips.
     pub is_along_curve: bool,
     /// Quantity to measure.
     pub task: Task,

@@ -8,8 +8,8 @@ use photoncard_render::PROGRAM;
 use super::report::Provenance;
 
 impl Provenance {
-    /// Provenance with this program, machine and date, and the command line `command_line`. The study adds
-    /// its settings.
+    /// Provenance with this program, machine and date, and the command line `command_line`. It has no
+    /// settings yet; the study adds them.
     pub fn here(command_line: &str) -> Self {
         let days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs() / 86_400);
         Self {

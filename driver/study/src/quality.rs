@@ -1,8 +1,8 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
 //! Sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels. The
-//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that gather rays
-//! bring from the photon map is compared:
+//! order of gathers, the size of tiles, the layout of the photon map and the caches do not change them. Only
+//! the light that gather rays bring from the photon map is compared:
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
@@ -33,7 +33,8 @@ pub struct TileDeviation {
     pub pixels: usize,
     /// Sum of squared differences from the reference.
     pub squares: f64,
-    /// Unbiased estimate of the part of [`Self::squares`] that is noise of the reference.
+    /// Estimate of the part of [`Self::squares`] that is caused by the noise of the reference; it is
+    /// unbiased.
     pub noise: f64,
     /// Sum of the pixels' channels.
     pub sum: f64,
@@ -41,7 +42,7 @@ pub struct TileDeviation {
     pub reference: f64,
 }
 
-/// Error of a render's indirect light against that of a reference with many gather rays.
+/// Error of a render's indirect light, compared with the indirect light of a reference with many gather rays.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Errors by tile. All pixels have equal weight.
@@ -114,8 +115,8 @@ pub(crate) struct Reference {
     tiles: Vec<Vec<Option<ReferencePixel>>>,
 }
 
-/// Numbers of rays of the two renders of a reference with `rays` rays in total. They differ, so that the
-/// strata differ.
+/// Numbers of rays of the two renders of a reference with `rays` rays in total. They are unequal, so that the
+/// two renders have different strata.
 fn halves(rays: u32) -> [u32; 2] {
     let first = 3 * rays / 8;
     [first, rays - first].map(|rays| rays.max(1))
@@ -207,7 +208,7 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileDevia
     error
 }
 
-/// Returns `settings` with fixed values of everything that does not change indirect light: tiles of 16x16
+/// Returns `settings` with fixed values for the settings that do not change indirect light: tiles of 16x16
 /// pixels, sorted gathers with the chip's own queue, and no shadow rays.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {

@@ -62,8 +62,8 @@ pub(crate) struct Chosen {
     pub(crate) stands_for: usize,
 }
 
-/// Chooses `count` of the tiles, spread over the picture, and returns them in the picture's order; all tiles
-/// if `count` is larger.
+/// Chooses `count` of the tiles, spread over the picture, or all tiles if there are fewer. Returns them in
+/// the picture's order.
 pub(crate) fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     let count = count.min(tiles.len());
     let mut sorted = tiles.to_vec();
@@ -84,8 +84,7 @@ pub(crate) fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     chosen
 }
 
-/// Spreads the bits of a number to the even positions of 64 bits, with zeros at the odd positions: half of a
-/// Morton code.
+/// Moves bit `i` of a number to bit `2 i`, with zeros at the odd positions: half of a Morton code.
 fn spread_bits(number: u32) -> u64 {
     (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
 }
@@ -134,11 +133,8 @@ impl Estimate {
 /// Ratio of two estimates, with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ratio {
-    /// The ratio.
     pub value: f64,
-    /// Lower end of the interval.
     pub lower: f64,
-    /// Upper end of the interval.
     pub upper: f64,
 }
 
@@ -157,8 +153,8 @@ impl Ratio {
     }
 }
 
-/// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). For each
-/// observation, `without_one` has the statistic of all other observations. The half-width is infinite for
+/// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). Element `i` of
+/// `without_one` is the statistic of all observations except observation `i`. The half-width is infinite for
 /// fewer than two observations.
 pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
@@ -236,7 +232,8 @@ mod tests {
         assert_eq!(estimate.value, 5.0);
     }
 
-    /// Uniform, skewed and two-valued populations are sampled repeatedly in stretches of a shuffled order.
+    /// Totals of uniform, skewed and two-valued populations are estimated repeatedly from stretches of a
+    /// shuffled order.
     #[test]
     fn the_interval_covers_the_total_of_a_population_at_its_confidence_level() {
         let uniform = |index: u32| (f64::from(hash(index)) + 0.5) / 4_294_967_296.0;

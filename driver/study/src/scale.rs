@@ -145,8 +145,8 @@ impl Scale {
         })
     }
 
-    /// Settings of [`Self::all_on`] with the dissertation's tiles of 16x16 pixels, of which a frame has
-    /// enough for many chips.
+    /// Settings of [`Self::all_on`] with the dissertation's tiles of 16x16 pixels. A frame then has enough
+    /// tiles for many chips.
     pub(crate) fn all_on_in_small_tiles(&self) -> RenderSettings {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }

@@ -2,8 +2,9 @@
 //! The memory traffic in this order is the bound with which the orders of chips are compared.
 //!
 //! No chip can do this, because the gathers of a frame take gigabytes. Emulated chips pass their gathers to
-//! the host, which sorts them, and does them when all rays are cast (Steinhurst, Coombe, Lastra 2005).
-//! Gathers of irradiance records, whose results are needed before those of pixels, stay on the chips.
+//! the host, which sorts them, and performs them when all rays are cast (Steinhurst, Coombe, Lastra 2005).
+//! Gathers of irradiance records stay on the chips, because their results are needed before the gathers of
+//! pixels.
 
 use glam::Vec3;
 use photoncard_firmware::chip::{Component, PixelView};
@@ -30,7 +31,7 @@ const MAX_GATHERS: u64 = 1 << 27;
 /// Approximate number of gathers for which rays are cast in one round. The host collects the gathers after
 /// the round.
 const GATHERS_PER_CAST: u64 = 1 << 21;
-/// Number of gathers per task. It is large, so that the empty caches at a task's beginning hardly matter.
+/// Number of gathers per task. It is large, because each task begins with empty caches, which adds traffic.
 const GATHERS_PER_TASK: usize = 1 << 22;
 
 /// A gather that waits for its turn along the curve.
@@ -52,14 +53,14 @@ struct Frame {
     traffic: MemoryTraffic,
 }
 
-/// A tile whose rays are cast, and the gathers that it leaves to the host.
+/// A tile whose rays are cast, and its gathers, which the host is to perform.
 struct CastTile {
     tile: RenderedTile,
     /// Gathers with the indices of their pixels in the tile.
     waiting: Vec<(u32, GatherRequest)>,
 }
 
-/// Collector of the gathers of a chip.
+/// Collector of the gathers that a chip passes to the host, with the indices of their pixels in the tile.
 struct Outlet(Vec<(u32, GatherRequest)>);
 
 impl GatherOutlet for Outlet {
@@ -85,7 +86,7 @@ pub struct WholeFrame<'a> {
     pub is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Picture, work and memory traffic of a frame.
+/// Pixels, work and memory traffic of a frame.
 pub struct FrameOutcome {
     /// Tiles of the picture. Their pixels are the same in every order of gathers.
     pub tiles: Vec<FinishedTile>,
@@ -215,8 +216,8 @@ impl Frame {
         Ok(all)
     }
 
-    /// Adds the sums and gathers of tiles. The gathers can exceed the reserved memory only if glossy lobes
-    /// are gathered beside an irradiance cache, or if samples have several paths.
+    /// Adds the sums and gathers of tiles. There can be more gathers than memory is reserved for only if
+    /// glossy lobes are gathered beside an irradiance cache, or if samples have several paths.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), RenderError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
@@ -239,7 +240,7 @@ impl Frame {
 
 /// Results of some gathers.
 struct Gathered {
-    /// Light that each gather brings, with the index in [`Frame::sums`] of the sum to which it is added.
+    /// Light of each gather, with the index in [`Frame::sums`] of the sum to which it is added.
     brought: Vec<(u32, Vec3)>,
     counters: Counters,
     traffic: MemoryTraffic,

@@ -26,7 +26,7 @@ pub(crate) trait Board {
     /// Runs `work` with interrupts masked.
     fn masked<R>(work: impl FnOnce() -> R) -> R;
 
-    /// Sleeps until an interrupt is pending, masked or not: that of the UART or, at most a millisecond later,
-    /// that of the clock.
+    /// Sleeps until an interrupt is pending, even if it is masked: the interrupt of the UART, or that of the
+    /// clock, which comes within a millisecond.
     fn sleep();
 }

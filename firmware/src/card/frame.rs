@@ -59,6 +59,6 @@ fn has_irradiance(header: &Header) -> bool {
 /// irradiance.
 pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
 
-/// Maximum width and height of a picture, pixels. At this size an `f32` holds a pixel's index and 7 bits of a
-/// position in the pixel.
+/// Maximum width and height of a picture, pixels. At this size an `f32` holds a pixel's column or row and 7
+/// bits of a position in the pixel.
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;

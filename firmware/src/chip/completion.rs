@@ -33,8 +33,8 @@ enum Use {
     /// The path is a term of the pixel's sum, with this weight. If the path has gather rays, [`Pass::Direct`]
     /// adds its light of shadow rays and caustics.
     Term(f32),
-    /// The path's light only determines the number of paths. Shadow rays and caustics are part of it, gather
-    /// rays are not.
+    /// The path's light is only used to determine the number of paths. It includes the light of shadow rays
+    /// and caustics, but not of gather rays.
     Probe,
 }
 

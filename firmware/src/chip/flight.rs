@@ -16,7 +16,7 @@ use crate::render::PixelSample;
 /// Capacity of the stack of blocks, sufficient for all halvings of a tile.
 const MAX_BLOCKS: usize = 32;
 
-/// Value in [`Flight::sums`] of a pixel for which no gather rays were found so far.
+/// Value in [`Flight::sums`] of a pixel that, as far as is known, has no gather rays.
 const PLAIN: u16 = u16::MAX;
 /// Value in [`Flight::sums`] of a pixel that has gather rays, but no sum yet.
 const UNSUMMED: u16 = PLAIN - 1;
@@ -33,8 +33,8 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// Number of each pixel of the block among the tile's pixels in [`super::pixel_sums::PixelSums`], or
-    /// [`PLAIN`] or [`UNSUMMED`].
+    /// For each pixel of the block, its number among the tile's pixels in [`super::pixel_sums::PixelSums`];
+    /// or [`PLAIN`] or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
     /// Number of paths per sample, by pixel of the block.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,

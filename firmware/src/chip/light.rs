@@ -1,4 +1,5 @@
-//! Components of a pixel's light, and their sums. A pixel has one sum or, with layers, one per component.
+//! Components of a pixel's light, and their sums. In a frame with layers, a pixel has a sum for each
+//! component; otherwise it has a single sum.
 //!
 //! A pixel's radiance is the sum of its components. Fixed-point sums are exact, so that this radiance has the
 //! same bits with and without layers. With layers a pixel has [`SUMS_WITH_LAYERS`] sums, the last of which

@@ -7,10 +7,10 @@
 //! When all rays of a block's irradiance records, or of its pixels, are cast, their gathers wait in the queue
 //! with those of other tiles, and another tile proceeds. The queue is drained when it is full or nothing else
 //! can be done. A block's pixels that need only irradiance records are completed when the records are
-//! gathered, the others when no gather of the block waits. Each call of [`Chip::step`] does a small piece of
-//! this work.
+//! gathered. Its other pixels are completed when none of its gathers waits any more. Each call of
+//! [`Chip::step`] does a small piece of this work.
 //!
-//! | state | data of a tile in flight, kept from its command to its last pixel |
+//! | state | data that it keeps of a tile in flight, from the tile's command to its last pixel |
 //! |---|---|
 //! | `Flight` | tile, counters, progress, irradiance records |
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
@@ -117,8 +117,8 @@ impl<K: ChipKind> Chip<K> {
         Self { kind, flights: Array::VACANT, active: None, shared: Shared::new() }
     }
 
-    /// Creates a chip without tiles, with capacities set at run time instead of by types. They are those of
-    /// the kind's budget, and `points` for the gather points whose rays are cast together.
+    /// Creates a chip without tiles, with capacities set at run time instead of by types. The capacity for
+    /// gather points whose rays are cast together is `points`; all others are those of the kind's budget.
     pub fn sized(kind: K, points: usize) -> Self {
         let budget = *kind.budget();
         let mut chip = Self::vacant_of(kind);
@@ -130,13 +130,13 @@ impl<K: ChipKind> Chip<K> {
         chip
     }
 
-    /// The kind of the chip.
+    /// Kind of the chip: its budget and the capacities of its buffers.
     pub fn kind(&self) -> &K {
         &self.kind
     }
 
-    /// Maximum number of pixels of a tile in `frame`: the budget's, or a fourth of it if the frame has
-    /// layers.
+    /// Maximum number of pixels of a tile in `frame`: the number in the budget, or a fourth of it if the
+    /// frame has layers (separate sums of direct, indirect and caustic light).
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
         u64::from(self.kind.budget().pixels_of_tile(frame.layers))
     }
@@ -259,9 +259,9 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Chooses the next tile in flight to work on: one whose block has pixels with gather rays left, else one
-    /// whose next block has not begun. Without either, begins a drain if there is no room for another tile;
-    /// otherwise the chip is idle.
+    /// Chooses the next tile in flight to work on. A tile whose block has pixels with gather rays left comes
+    /// first, then a tile whose next block has not begun. If there is neither, begins a drain if there is no
+    /// room for another tile; otherwise the chip is idle.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {

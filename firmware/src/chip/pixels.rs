@@ -56,8 +56,8 @@ pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
     SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
-/// Gather point at the end of an eye path whose sample has `paths` paths. It is for the lobe alone if
-/// irradiance records cover the sample, as geometry decides. Its direction table is not chosen yet.
+/// Gather point at the end of an eye path whose sample has `paths` paths. If irradiance records cover the
+/// sample, by their geometry alone, the point is for the lobe only. Its direction table is not chosen yet.
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
@@ -84,8 +84,8 @@ impl<K: ChipKind> Flight<K> {
         shared.sums.has_room(frame) || next().is_none_or(|pixel| self.sum(pixel).is_some())
     }
 
-    /// Index in the block of the stripe's next pixel that has gather rays and whose current sample has a path
-    /// with the current number; `None` after the last. The stripe has `stripe` pixels.
+    /// Index in the block of the stripe's next pixel to trace; `None` after the last. Such a pixel has gather
+    /// rays and, in its current sample, a path with the current number. The stripe has `stripe` pixels.
     fn next_pixel(&self, frame: &FrameParameters, stripe: u32) -> Option<u32> {
         let first = self.position.first;
         self.first_with_path(frame, first + self.position.index..first + stripe)
@@ -117,8 +117,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Index in the block of the first of `pixels` that has gather rays and whose current sample has a path
-    /// with the current number; `None` if there is none.
+    /// Index in the block of the first pixel to trace among `pixels`; `None` if there is none. Such a pixel
+    /// has gather rays and, in its current sample, a path with the current number.
     fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
         let Range { mut start, end } = pixels;
         let sample = self.position.sample_of(frame);
@@ -185,7 +185,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays in the current direction bin for the next gather point that has any.
+    /// Casts gather rays of the next gather point that has rays in the current direction bin.
     pub(super) fn cast_for_pixel<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -250,8 +250,8 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Light that the gather point of a path reflects: direct light found by shadow rays, and caustics. In the
-/// card image's radiance units.
+/// Light that the gather point of a path reflects, in the card image's radiance units: direct light found by
+/// shadow rays, and caustics.
 pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,

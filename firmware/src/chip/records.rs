@@ -30,7 +30,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Begins the survey of the block's records.
+    /// Begins the survey, which places the block's irradiance records.
     pub(super) fn begin_records(&mut self) -> Result<(), Fault> {
         self.position = Position::at(Pass::Survey);
         match self.cache.begin(&self.window()) {
@@ -85,7 +85,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays in the current direction bin for the next record that has any.
+    /// Casts gather rays of the next record that has rays in the current direction bin.
     pub(super) fn cast_for_record<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,

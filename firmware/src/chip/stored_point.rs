@@ -1,4 +1,5 @@
-//! Part of a gather point that a chip stores from one direction bin to the next.
+//! Part of a gather point that a chip stores while it casts the point's rays, one direction bin after
+//! another.
 
 use core::ops::Range;
 
@@ -14,13 +15,13 @@ use crate::scene::{Seen, Surface};
 /// Maximum number of gather rays of one point that are cast in one piece of work.
 const RAYS_PER_STEP: u32 = 64;
 
-/// Part of a gather point that is stored from one direction bin to the next, 48 bytes. The remainder is
-/// computed again in each bin.
+/// Part of a gather point that is stored while the point's rays are cast, one direction bin after another; 48
+/// bytes. The remainder is computed again in each bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
     /// Triangle of a pixel's gather point, and the position on it. [`Seen::ELSEWHERE`] if the eye path must
-    /// be traced again to find the surface: the path passes perfectly specular surfaces or chooses a material
-    /// layer at random. Unused for an irradiance record.
+    /// be traced again to find the surface: the path passes perfectly specular surfaces, chooses a material
+    /// layer at random, or ends on an instance. Unused for an irradiance record.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
     /// Number of rays to cast, and their purpose.
@@ -88,7 +89,7 @@ impl StoredPoint {
         (first..number, None)
     }
 
-    /// Restores the gather point of a pixel's path, with weight 1 and without its surface.
+    /// Restores the gather point of a pixel's path. Its weight is 1, and its surface a placeholder.
     #[inline(always)]
     pub(super) fn point(&self, pattern: Pattern) -> GatherPoint {
         GatherPoint {

@@ -7,7 +7,7 @@ use crate::sampler::hash;
 
 /// Number of upper bits of a grid coordinate that select a cell of the Hilbert curve.
 const CURVE_BITS: u32 = 10;
-/// Number of lower bits of a grid coordinate that are the offset within that cell.
+/// Number of lower bits of a grid coordinate that are the offset within a cell of the Hilbert curve.
 const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
 const REST_MASK: u64 = (1 << REST_BITS) - 1;
 /// Number of bits of each coordinate of a hash cell: 16 cells along each axis of the grid.

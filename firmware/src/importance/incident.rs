@@ -22,16 +22,17 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Fraction of the flux in a product table that is spread evenly over the cells (defensive sampling), because
-/// light varies within a cell and may come through a cell without photons. It bounds the weight of a ray by
-/// about twice the albedo. `docs/techniques.md` has the measurement.
+/// Fraction of the flux in a product table that is spread evenly over the cells (defensive sampling). Light
+/// varies within a cell, and may come through a cell without photons. The even part bounds the weight of a
+/// ray by about twice the albedo. `docs/techniques.md` has the measurement.
 const EVEN_SHARE: f32 = 0.55;
-/// Minimum flux of a cell in a photon table, as a fraction of the mean flux: the small energy of Jensen 1995.
+/// Minimum flux of a cell in a photon table, as a fraction of the mean flux (Jensen 1995).
 const EMPTY_CELL: f32 = 0.1;
 /// Number of directions sampled from the lobe to distribute it over the cells.
 const LOBE_POINTS: u32 = 32;
-/// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. A product
-/// table gives half of the light that such a lobe reflects to its cells, and half to its entry for the lobe.
+/// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. In a product
+/// table, the cells get half of the light that such a lobe reflects, and the lobe's own entry gets the other
+/// half.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
 /// Minimum share of the rays for the lobe's own entry, as a multiple of
 /// `lobe albedo / (diffuse albedo + lobe albedo)`.
@@ -100,7 +101,7 @@ impl IncidentFlux {
 }
 
 impl DirectionTable {
-    /// Direction table of the reflection only.
+    /// Direction table that depends on the reflection only, not on photons.
     pub fn of_reflection(reflector: &Reflector) -> Self {
         let [diffuse, lobe] = reflector.albedos();
         Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], lobe)
@@ -111,8 +112,8 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// Product table: flux times reflection. The lobe is divided between the cells and its own entry. A lobe
-/// narrower than two cells goes mostly to its own entry.
+/// Product table, in proportion to flux times reflection. The light that the lobe reflects is divided between
+/// the cells and the lobe's own entry. For a lobe narrower than two cells, most of it goes to that entry.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);

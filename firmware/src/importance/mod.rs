@@ -3,15 +3,15 @@
 //!
 //! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and
 //! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is mapped by
-//! the table's inverse cumulative distribution function, and the density of the whole mixture weights each
-//! ray, so that no choice of shares biases the picture. The sampling methods differ only in the source of the
+//! the table's inverse cumulative distribution function. The density of the whole mixture weights each ray,
+//! so that no choice of shares biases the picture. The sampling methods differ only in the source of the
 //! shares:
 //!
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
 //! | reflection | the Lambertian albedo, all cells alike | the lobe's albedo |
 //! | photon (Jensen 1995, *Importance driven path tracing using the photon map*) | the flux of the photons that came through it | none |
-//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
+//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | the same flux, multiplied by the reflection | the part of the lobe that is narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
 //! Points with few rays use the table of the reflection with every sampling method

@@ -53,8 +53,8 @@ impl DirectionTable {
         sum(&self.cells) + self.lobe as u32
     }
 
-    /// Fraction of all rays that a cell's entry has. Rays of the lobe's entry that pass through the cell are
-    /// not included.
+    /// Fraction of all rays that belong to a cell's entry. Rays of the lobe's entry that pass through the
+    /// cell are not included.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
     }

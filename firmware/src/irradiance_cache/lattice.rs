@@ -25,7 +25,7 @@ pub struct LatticePoint {
 }
 
 /// Offset of a record's eye ray from its lattice point, pixels. In a symmetric view of a room, edges between
-/// walls would otherwise run exactly through lattice points, and the survey rays of a record on an edge would
+/// walls would otherwise run exactly through lattice points. The survey rays of a record on an edge would
 /// miss the adjacent wall.
 const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 

@@ -131,8 +131,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Begins the gather of record `index`. The direction table of `point`, its gather point, determines the
-    /// coefficients of the record's translational gradient.
+    /// Begins the gather of record `index`. The direction table of `point`, the record's gather point,
+    /// determines the coefficients of the record's translational gradient.
     ///
     /// # Errors
     /// [`Invariant::Record`] if the record was not surveyed.

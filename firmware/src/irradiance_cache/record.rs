@@ -79,9 +79,9 @@ impl Strongest {
     }
 }
 
-/// Maximum strength of a record's strongest term, divided by the sum of the others, if no other term is
-/// nearly as strong. A small bright surface that the direction table does not favour is hit by a ray of only
-/// one record in many, and would show as a disc of that record's radius.
+/// Maximum ratio of the strength of a record's strongest term to the summed strength of the others, if no
+/// other term is nearly as strong. A small bright surface that the direction table does not favour is hit by
+/// a ray of only one record in many, and would show as a disc of that record's radius.
 const LONE_SHARE: f32 = 0.25;
 
 impl GatherSums {
@@ -119,7 +119,7 @@ impl GatherSums {
         }
     }
 
-    /// Limits the strength of the strongest term to `max(second, LONE_SHARE * others)`, where `second` is the
+    /// Limits the strength of the strongest term to `max(second, LONE_SHARE * others)`. Here `second` is the
     /// strength of the second strongest term and `others` the sum of all terms but the strongest. The
     /// strongest term is stored as `Rgbe`; by this rounding it may exceed the limit by about 1/128 of its
     /// strength. A record's only term is kept.
@@ -219,10 +219,10 @@ impl Record {
     }
 
     /// Error of the record at a point `p` with the normal `n`: `|p - p_i|^2 / R^2 + 1 - n.n_i`, where `p_i`
-    /// and `n_i` are the record's, and `R` is `radius`. It is of second order in distance and angle, because
-    /// gradients remove the first-order error of Ward, Rubinstein, Clear 1988. It is infinite for points off
-    /// the record's tangent plane (the tolerance shrinks with the distance of the surroundings) and for
-    /// normals at 90 degrees or more.
+    /// and `n_i` are the record's position and normal, and `R` is `radius`. It is of second order in distance
+    /// and angle, because gradients remove the first-order error of Ward, Rubinstein, Clear 1988. It is
+    /// infinite for points off the record's tangent plane (the tolerance shrinks with the distance of the
+    /// surroundings) and for normals at 90 degrees or more.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);

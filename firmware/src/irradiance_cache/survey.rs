@@ -24,7 +24,7 @@ use crate::vector::min;
 /// Minimum of `radius of validity * sqrt(allowed error)`, pixels: the distance up to which a record is valid.
 /// It bounds the number of records in the corners of a room.
 const MIN_REACH: f32 = 3.0;
-/// Error bound below which [`MIN_REACH`] shrinks in proportion to the bound, so that the picture converges to
+/// Error bound below which [`MIN_REACH`] shrinks in proportion to the bound. The picture thus converges to
 /// the picture without records as the bound approaches 0.
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 

@@ -9,18 +9,19 @@ use crate::memory::CacheEntry;
 
 /// A kind of chip: the containers of its buffers, and their capacities.
 pub trait ChipKind: 'static {
-    /// Containers with capacity [`Budget::tile_pixels`].
+    /// Containers for the pixels of a tile, with capacity [`Budget::tile_pixels`].
     type TilePixels: Capacity;
-    /// Containers whose capacity is [`gather_candidates`] for [`Budget::neighbors`] neighbours.
+    /// Containers for the candidates of a photon search for [`Budget::neighbors`] neighbours, with capacity
+    /// [`gather_candidates`].
     type Candidates: Capacity;
-    /// Containers with capacity [`Budget::gather_queue`].
+    /// Containers for queued gathers, with capacity [`Budget::gather_queue`].
     type GatherQueue: Capacity;
-    /// Containers with capacity [`Budget::irradiance_records`].
+    /// Containers for the irradiance records of a tile, with capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
     /// Containers for gather points whose rays are cast together. The points belong to all irradiance records
     /// of a block of pixels, or to some consecutive pixels of the block.
     type Points: Capacity;
-    /// Containers with capacity [`Budget::in_flight`].
+    /// Containers for the tiles in flight, with capacity [`Budget::in_flight`].
     type Flights: Capacity;
 
     /// Budget of the kind, which a card reports when a session begins.

@@ -1,8 +1,8 @@
 //! Set-associative caches of lines with LRU replacement.
 //!
 //! [`LineCaches`] serves two purposes. On a board with slow DRAM, it keeps lines in on-chip memory. Around a
-//! [`super::Counted`], it simulates the fetches of a chip with caches of this shape. The cached data are used
-//! in both cases, so that simulated hits are hits by construction, and a wrong line would show in the
+//! [`super::Counted`], it simulates the fetches of a chip with caches of the given shape. The cached data are
+//! used in both cases, so that simulated hits are hits by construction, and a wrong line would show in the
 //! picture.
 
 use core::fmt;
@@ -14,7 +14,8 @@ use photoncard_shared::message::Fault;
 use super::{CardMemory, MemoryPort, Stage, outside};
 use crate::sampler::hash;
 
-/// Mapping from the index of a block of card memory, as long as a cache line, to its set in the cache.
+/// Mapping from the index of a block to its set in the cache. A block is a part of card memory as long as a
+/// cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SetIndex {
     /// Index modulo the number of sets.

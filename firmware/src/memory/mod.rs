@@ -53,7 +53,7 @@ pub trait MemoryPort {
     #[inline(always)]
     fn begin_tile(&mut self) {}
 
-    /// Ends the tile with this number, before the card reports the end to its host.
+    /// Notifies the port that the tile with this number has ended, before the card reports this to its host.
     #[inline(always)]
     fn end_tile(&mut self, _: u32) {}
 }

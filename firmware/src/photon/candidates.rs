@@ -17,7 +17,8 @@ pub struct Candidate {
     pub(super) content: u64,
 }
 
-/// Odd factor that scrambles contents, so that ties favour neither bright nor dim photons.
+/// Odd factor that scrambles contents, so that ties between equal distances favour neither bright nor dim
+/// photons.
 const SCRAMBLE: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mask that clears the splitting axis in a photon's content.

@@ -51,7 +51,7 @@ pub fn reflected_caustics(search: CausticSearch<'_, impl MemoryPort>) -> Result<
     simd::run(search)
 }
 
-/// Kernel of [`reflected_caustics`].
+/// Search of [`reflected_caustics`], compiled for every instruction set.
 pub struct CausticSearch<'s, M> {
     /// The scene, with its caustic map.
     pub scene: &'s SceneImage,
@@ -80,7 +80,7 @@ const MARGIN_CELLS: f32 = 2.0;
 /// Slope against the tangent plane that the direction to a photon may have because of the rounding of coded
 /// normals.
 const FLAT_SLOPE: f32 = 0.15;
-/// Divisor of a photon's factor `(1 - d^2 / h^2) / s` in the sums, where `s` is the area of the photon's disc
+/// Divisor of a photon's factor `(1 - d^2 / h^2) / s` in the sums. Here `s` is the area of the photon's disc
 /// divided by the maximum area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`];
 /// a photon with the largest disc has a resolution of twenty bits.
 const FACTOR_UNIT: f32 = 32_768.0;
@@ -128,7 +128,7 @@ struct Sums<'a> {
     lit_by: LitBy,
     normals: [Vec3; 2],
     surface: SameSurface,
-    /// Bit mask of the classes of the normals of the surface's photons ([`SameSurface::classes`]).
+    /// Bit mask of the classes of normals that photons of the surface can have ([`SameSurface::classes`]).
     classes: u16,
     /// Sum of power times kernel factor, divided by [`FACTOR_UNIT`].
     power: ColourSum,

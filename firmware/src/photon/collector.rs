@@ -9,8 +9,9 @@ pub(super) trait Collector {
     /// Squared search radius, m^2.
     fn limit(&self) -> f32;
 
-    /// Narrows the search radius by a visited node's [`PhotonNode::photon_share`]. Only collectors whose
-    /// search can be repeated with a larger radius implement this.
+    /// Narrows the search radius to the estimate `r` of a visited node, where `photon_share` is `r^2 / k`,
+    /// m^2 ([`PhotonNode::photon_share`]). Only collectors whose search can be repeated with a larger radius
+    /// implement this.
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 

@@ -46,7 +46,7 @@ pub fn nearest_irradiance(
     simd::run(PointSearch { scene, memory, position, normal, max_distance })
 }
 
-/// Kernel of [`nearest_irradiance`].
+/// Search of [`nearest_irradiance`], compiled for every instruction set.
 pub struct PointSearch<'s, M> {
     /// The scene, with its irradiance points.
     pub scene: &'s SceneImage,

@@ -146,7 +146,7 @@ pub fn gathered_radiance(
     Ok(if is_vouched { of_all } else { of_region }.radiance)
 }
 
-/// Kernel of [`gather`].
+/// Search of [`gather`], compiled for every instruction set.
 pub struct Search<'s, 'n, M> {
     /// The scene, with its photon maps.
     pub scene: &'s SceneImage,
@@ -170,7 +170,7 @@ impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
     }
 }
 
-/// Kernel of [`gather_visible`].
+/// Search of [`gather_visible`], compiled for every instruction set.
 struct VisibleSearch<'s, 'n, M> {
     scene: &'s SceneImage,
     memory: &'s mut M,
@@ -217,7 +217,8 @@ fn search<M: MemoryPort>(
     Ok(tested)
 }
 
-/// Kernel that selects the nearest of given candidates, in the way of [`NearestPhotons`].
+/// Selection of the nearest of given candidates, as by [`NearestPhotons`], compiled for every instruction
+/// set.
 pub struct Selection<'a> {
     /// Candidates to select from.
     pub candidates: Candidates<'a>,

@@ -37,8 +37,8 @@ pub struct NearestPhotons<'a> {
 
 impl<'a> NearestPhotons<'a> {
     /// Creates an empty set for the k = `neighbors` nearest photons within `max_distance`, metres. The
-    /// capacity of `candidates` should be [`photoncard_shared::budget::gather_candidates`]. k is limited to
-    /// the capacity less [`LANES`] + 1.
+    /// capacity of `candidates` should be [`photoncard_shared::budget::gather_candidates`]. k is at most the
+    /// capacity minus `LANES + 1`.
     pub fn new(candidates: Candidates<'a>, neighbors: u32, max_distance: f32) -> Self {
         let room = candidates.capacity().saturating_sub(LANES);
         let neighbors = (neighbors as usize).clamp(1, room.saturating_sub(1).max(1));

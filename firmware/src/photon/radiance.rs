@@ -57,8 +57,8 @@ pub enum Sight {
 }
 
 /// Maximum area of the disc up to the closest photon, divided by the mean area per photon. If the photon is
-/// farther away, its disc fraction does not represent the point's. On a wall, this happens in one gather of
-/// 1,100.
+/// farther away, its disc fraction does not represent that of the point. On a wall, this happens in one
+/// gather of 1,100.
 const APART: f32 = 7.0;
 
 /// Density estimate from the photons of a finished search: their reflected power, divided by the area of
@@ -74,7 +74,7 @@ pub fn reflected_radiance(
     simd::run(Estimate { nearest, cell, region, reflection, lobe })
 }
 
-/// Kernel of [`reflected_radiance`].
+/// Computation of [`reflected_radiance`], compiled for every instruction set.
 pub struct Estimate<'a, 'n> {
     /// The nearest photons of a finished search.
     pub nearest: &'a NearestPhotons<'n>,

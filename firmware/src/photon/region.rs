@@ -26,11 +26,11 @@ use crate::vector::{max, max_component, min, tangents, unit};
 /// Number of sectors.
 pub const SECTORS: usize = BUNDLE_RAYS;
 
-/// Height of the horizontal rays above the surface, divided by the gather radius, if nothing covers the point
-/// closely. Lower objects hide nothing.
+/// Height of the rays along the surface, divided by the gather radius, if nothing covers the point closely.
+/// Objects below this height hide nothing.
 const HEIGHT: f32 = 0.03;
-/// Distance from the surface at which the vertical rays start, divided by the gather radius. The side of a
-/// cell of the photon grid is added to the product.
+/// Factor of the height `LIFT * radius + cell` at which rays along the normal start. `radius` is the gather
+/// radius, and `cell` is the side of a cell of the photon grid.
 const LIFT: f32 = 1e-3;
 /// Maximum slope, against the tangent plane, of the direction to a photon of the region.
 const MAX_SLOPE: f32 = 0.4;
@@ -222,7 +222,7 @@ impl VisibleRegion {
     }
 }
 
-/// Distance from the surface, metres, at which the vertical rays start (`LIFT`).
+/// Distance from the surface, metres, at which rays along the normal start (`LIFT`).
 fn lift(scene: &SceneImage, radius: f32) -> f32 {
     LIFT * radius + scene.header.photon_grid.cell
 }

@@ -29,8 +29,8 @@ const fn computed_normal(code: u8) -> Vec3 {
     Vec3::new(x * inverse, y * inverse, z * inverse)
 }
 
-/// For each code of a surface's normal, a bit mask: the classes ([`normal_class`]) of all photon normals
-/// whose cosine to the surface's normal is at least [`MIN_NORMAL_COSINE`].
+/// For each code of a surface's normal, a bit mask of classes of normals ([`normal_class`]): the classes of
+/// all photon normals whose cosine to the surface's normal is at least [`MIN_NORMAL_COSINE`].
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];

@@ -3,16 +3,16 @@
 //! On a surface, the squared distance of the k-th photon is proportional to k. Interpolation therefore
 //! guesses an interval of squared distances that contains the k-th and few others. Counting the candidates
 //! below its ends verifies and corrects the guess. One pass then keeps the candidates below the interval and
-//! sets aside those within it, of which the nearest complete the k. If no guess succeeds, for example with
-//! many equal distances, quickselect (Hoare 1961) is used. After a bounded number of pivots it gives way to a
-//! radix selection by bits of the sort key. All methods select the same set.
+//! sets aside those within it. The nearest of the latter complete the set of k candidates. If no guess
+//! succeeds, for example with many equal distances, quickselect (Hoare 1961) is used. After a bounded number
+//! of pivots it gives way to a radix selection by bits of the sort key. All methods select the same set.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
 
 /// Maximum number of guesses of an interval.
 const GUESSES: u32 = 4;
-/// Maximum number of candidates in a successful guess.
+/// Maximum number of candidates in the interval of a successful guess.
 const BETWEEN: usize = 32;
 /// Maximum number of pivots in quickselect before the radix selection starts.
 const PIVOTS: u32 = 16;

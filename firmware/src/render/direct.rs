@@ -7,11 +7,11 @@
 //! technique and `m` rays of density `q` in the other, a path has the weight `n p / (n p + m q)` in the
 //! first. The two weights of a path add up to 1, so that direct light is counted once.
 //!
-//! Emission that the rays of an irradiance record hit is interpolated for the samples around the record; the
-//! samples' shadow rays add the remainder. Record and samples must agree on the weights. The weights
-//! therefore assume the density `cos(theta) / pi` for the record's rays, because samples do not know its
-//! direction table, and the shadow rays of all planned samples of a pixel. Here the power heuristic is used:
-//! it leaves small emitters, which would make a record noisy, to shadow rays, and a sky to records.
+//! The emission hit by the rays of an irradiance record is interpolated for the samples around the record;
+//! the samples' shadow rays add the remainder. Record and samples must agree on the weights, but samples do
+//! not know the record's direction table. The weights therefore assume the density `cos(theta) / pi` for the
+//! record's rays, and the shadow rays of all planned samples of a pixel. Here the power heuristic is used: it
+//! leaves small emitters, which would make a record noisy, to shadow rays, and a sky to records.
 //!
 //! No gather ray hits point, spot and distant lights, so that only shadow rays contribute their light.
 //!
@@ -118,8 +118,8 @@ impl ShadowRays {
     }
 }
 
-/// Radiance of an unoccluded light sample that a gather point reflects, weighted against gather rays,
-/// W/(sr m^2).
+/// Radiance, W/(sr m^2), that a gather point reflects from an unoccluded light sample, weighted against
+/// gather rays.
 fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
     let LightSample { direction, irradiance, density, .. } = *light;

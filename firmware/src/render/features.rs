@@ -14,8 +14,8 @@ use crate::memory::MemoryPort;
 use crate::sampler::Dimension;
 use crate::scene::{Ray, ReflectedDirection, Surface, closest_hit, read_surface};
 
-/// Minimum fraction of a surface's albedo that belongs to its sharp lobe, for the features to be those of the
-/// surface that the lobe reflects.
+/// Minimum fraction of a surface's albedo that its sharp lobe must contribute, so that the features are taken
+/// from the surface that the lobe reflects.
 const MIN_SHARP_SHARE: f32 = 0.75;
 
 /// Albedo and normal that a sample shows, which guide a denoiser.

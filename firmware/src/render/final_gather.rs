@@ -176,8 +176,9 @@ fn collected<M>(
 }
 
 /// Weight of emission at the end of a gather ray that passed more than flat glass: specular surfaces or
-/// narrow lobes. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is
-/// the narrow lobe's part of `weight`, because the caustic map lights all other reflection.
+/// narrow lobes. No shadow ray finds this light. Without a caustic map the weight is `weight`. With a caustic
+/// map, it is the part of `weight` that belongs to the gather point's narrow lobe: the map lights all other
+/// reflection.
 fn beyond_specular<M>(
     context: &Context<M>,
     point: &GatherPoint,

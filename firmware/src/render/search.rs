@@ -9,8 +9,8 @@ use crate::memory::MemoryPort;
 use crate::photon::{NearestPhotons, PhotonMap, Reflected, gather};
 use crate::scene::PartialReflection;
 
-/// Counts the photon normals that a gather decoded and, if the reflection has a lobe, the photons that it
-/// found.
+/// Counts the photon normals that a gather decoded. If the reflection has a lobe, also counts the photons
+/// that the gather found.
 #[inline(always)]
 pub(super) fn count_reflection(
     counters: &mut Counters,

@@ -45,9 +45,7 @@ pub struct SpecularPath {
     pub is_straight: bool,
     /// Length of the path up to the origin of the current ray, metres.
     pub travelled: f32,
-    /// Transported quantity.
     carried: Carried,
-    /// Kinds of surfaces that the path passes.
     passes: Passes,
     /// Absorption coefficient of the medium around the current ray, 1/m.
     absorption: Vec3,
@@ -222,7 +220,8 @@ impl SpecularPath {
     }
 
     /// Applies Russian roulette after [`FREE_BOUNCES`] bounces. The path survives with the probability
-    /// `min(1, throughput)`, by the maximum channel; the throughput is then divided by that probability.
+    /// `min(1, t)`, where `t` is the throughput's maximum channel. The throughput is then divided by this
+    /// probability.
     fn survives(&mut self, random: &dyn Fn(u32) -> f32) -> bool {
         if self.bounces <= FREE_BOUNCES {
             return true;
@@ -305,7 +304,7 @@ pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Radiance of one light sample that a surface's narrow lobe reflects, W/(sr m^2). It is zero if the light
+/// Radiance, W/(sr m^2), that a surface's narrow lobe reflects from one light sample. It is zero if the light
 /// has an area, because rays of the lobe hit such lights.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(

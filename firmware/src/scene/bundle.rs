@@ -1,7 +1,7 @@
-//! Bundles of rays: up to sixteen rays traverse the bounding volume hierarchy together, so that a line of
-//! memory is fetched once for all rays that need it (compare Barringer, Akenine-Möller 2014, *Dynamic ray
-//! stream traversal*). Each ray requests the line separately. The number of requests thus equals that of
-//! single rays, and every request but the first is a cache hit.
+//! Bundles of rays: up to sixteen rays traverse the bounding volume hierarchy together (compare Barringer,
+//! Akenine-Möller 2014, *Dynamic ray stream traversal*). A line of memory is thus fetched once for all rays
+//! that need it. Each ray requests the line separately. The number of requests thus equals that of single
+//! rays, and every request but the first is a cache hit.
 //!
 //! Tests of boxes and triangles use the same operations as for a single ray ([`super::bvh`]). A ray's hit is
 //! therefore the same, bit for bit, in every bundle.
@@ -68,7 +68,8 @@ pub fn transmittances(
     Ok(searches)
 }
 
-/// Kernel of [`closest_hits`] (`S` is `Option<Hit>`) and of [`transmittances`] (`S` is [`Passed`]).
+/// Traversal of [`closest_hits`] (`S` is `Option<Hit>`) and of [`transmittances`] (`S` is [`Passed`]),
+/// compiled for every instruction set.
 pub struct Bundle<'a, M, S> {
     /// The scene.
     pub scene: &'a SceneImage,
@@ -180,8 +181,8 @@ impl<'a, S: Search> Rays<'a, S> {
         Self { ways, until, searches }
     }
 
-    /// Set of the rays that may still have a hit in a child that was pushed with `bits` (`RAYS`): with
-    /// nearest-first order, only rays whose maximum distance reaches the distance in `bits`.
+    /// Returns those rays in `bits` (see `RAYS`) that may still have a hit in the child pushed with `bits`.
+    /// In nearest-first order, this excludes rays whose maximum distance is below the distance in `bits`.
     #[inline(always)]
     fn within(&self, isa: impl Isa, bits: u32) -> u32 {
         match S::ORDER {
@@ -191,7 +192,7 @@ impl<'a, S: Search> Rays<'a, S> {
     }
 
     /// Tests the rays `here` against the boxes of a node's children. Returns the bits to push with each child
-    /// (`RAYS`): the rays that enter its box, and their least distance; `BEYOND` if no ray enters it.
+    /// (see `RAYS`): the rays that enter its box, and their least distance; `BEYOND` if no ray enters it.
     #[inline(always)]
     fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
         let children = WideNode(node.0).children() as usize;
@@ -229,8 +230,8 @@ impl<'a, S: Search> Rays<'a, S> {
         }
     }
 
-    /// Finds the hits of the rays `here` in a leaf, given by its index and that of its instance. Returns the
-    /// rays that need no further hit.
+    /// Finds the hits of the rays `here` with the triangles of the leaf `line`. `place` has the indices of
+    /// the leaf and of its instance. Returns the set of rays that need no further hit.
     #[inline(always)]
     fn meet<M: MemoryPort>(
         &mut self,

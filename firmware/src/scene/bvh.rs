@@ -1,7 +1,7 @@
 //! Ray caster: traversal of a bounding volume hierarchy. Nodes have sixteen children and leaves up to eight
-//! triangles; each is one line. A leaf without triangles is an [`Instance`] of a group, which has a hierarchy
-//! of its own. The group's boxes are tested in its space, and its triangles in world space, so that an
-//! instance and copies of its triangles at the same positions are hit alike.
+//! triangles; each takes one line of memory. A leaf without triangles is an [`Instance`] of a group, which
+//! has a hierarchy of its own. The group's boxes are tested in its space, and its triangles in world space.
+//! An instance and copies of its triangles at the same positions are therefore hit alike.
 
 use core::ops::ControlFlow;
 
@@ -60,7 +60,7 @@ pub fn transmittance(scene: &SceneImage, memory: &mut impl MemoryPort, ray: &Ray
     simd::run(ShadowRay { scene, memory, ray })
 }
 
-/// Kernel of [`closest_hit`].
+/// Search of [`closest_hit`], compiled for every instruction set.
 pub struct ClosestHit<'a, M> {
     /// The scene.
     pub scene: &'a SceneImage,
@@ -82,7 +82,7 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     }
 }
 
-/// Kernel of [`for_each_hit`].
+/// Search of [`for_each_hit`], compiled for every instruction set.
 struct EveryHit<'a, M, F> {
     scene: &'a SceneImage,
     memory: &'a mut M,
@@ -100,7 +100,7 @@ impl<M: MemoryPort, F: FnMut(Hit)> Kernel for EveryHit<'_, M, F> {
     }
 }
 
-/// Kernel of [`transmittance`].
+/// Search of [`transmittance`], compiled for every instruction set.
 pub struct ShadowRay<'a, M> {
     /// The scene.
     pub scene: &'a SceneImage,
@@ -129,8 +129,8 @@ pub(super) trait Search {
     /// True if the search continues behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of a triangle, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
-    /// distance of further hits, or [`ControlFlow::Break`] if no further hit is needed.
+    /// Processes a hit of the triangle in slot `at.1` of the leaf `at.0`. Returns the maximum distance of
+    /// further hits, or [`ControlFlow::Break`] if no further hit is needed.
     fn meet(&mut self, hit: Intersection, id: TriangleId, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
     /// Processes a hit of flat glass with a given transmittance. Returns [`ControlFlow::Break`] if no further
@@ -269,18 +269,18 @@ fn descend<S: Search>(
     Ok(())
 }
 
-/// Group of an instance that a traversal is in.
+/// Group of triangles that a traversal has entered, and its instance.
 pub(super) struct Group {
-    /// Index of the instance's line.
+    /// Index of the leaf line that holds the instance.
     index: u32,
     instance: Instance,
     outside: Outside,
 }
 
-/// Enters the group of an instance, whose root gets the distance bits `bits`.
+/// Enters the group of an instance: pushes the group's root onto the stack, with the distance bits `bits`.
 ///
 /// # Errors
-/// [`FaultCode::Record`] in the group of another instance, [`FaultCode::Depth`] if the stack overflows.
+/// [`FaultCode::Record`] if the traversal is already in a group; [`FaultCode::Depth`] if the stack overflows.
 #[cold]
 #[inline(never)]
 pub(super) fn enter(
@@ -297,7 +297,7 @@ pub(super) fn enter(
     Ok(())
 }
 
-/// Leaves a group at its end.
+/// Leaves a group after its last leaf, and continues the traversal around the group.
 #[cold]
 #[inline(never)]
 pub(super) fn leave(group: &mut Option<Group>, descent: &mut Descent<STACK>) {
@@ -306,7 +306,8 @@ pub(super) fn leave(group: &mut Option<Group>, descent: &mut Descent<STACK>) {
     }
 }
 
-/// The leaf `line` in world space, and the index of its instance. In a group the leaf is written to `moved`.
+/// Returns the leaf `line` in world space, and the index of its instance. In a group, the moved leaf is in
+/// `moved`.
 #[inline(always)]
 pub(super) fn moved_leaf<'l>(
     line: &'l [u8; LINE_BYTES],
@@ -323,7 +324,7 @@ pub(super) fn moved_leaf<'l>(
 
 pub(super) type BvhStack = Stack<STACK>;
 
-/// Entries of a [`BvhStack`].
+/// Capacity of a [`BvhStack`], entries.
 pub(super) const STACK: usize = BVH_STACK + LANES;
 
 /// Passes the hits of a ray with a leaf's triangles, up to the distance `until`, to `search`. Returns the new

@@ -20,7 +20,7 @@ const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
-    /// Index of the line of the triangle's instance, or [`NO_INSTANCE`].
+    /// Index of the leaf line that holds the triangle's instance, or [`NO_INSTANCE`].
     instance: u32,
     attributes: Attributes,
     weights: [f32; 3],

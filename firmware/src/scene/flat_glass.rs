@@ -8,7 +8,8 @@ use super::surface::{Surface, surface_of};
 use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 
-/// Transmittance, 0 to 1, of a flat glass triangle for a ray that hits it at the coordinates `weights`.
+/// Transmittance, 0 to 1, of a flat glass triangle for a ray that hits it at the barycentric coordinates
+/// `weights`.
 ///
 /// # Errors
 /// If the card image is invalid.

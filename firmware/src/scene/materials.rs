@@ -41,7 +41,7 @@ pub(super) fn read_layers(
     Ok(Layers::read(bytes))
 }
 
-/// Samples all textures of a material's layers at a point; 1 without vertex attributes.
+/// Samples all textures of a material's layers at a point; all values are 1 without vertex attributes.
 pub(super) fn layer_texel(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -70,7 +70,8 @@ impl SceneImage {
     /// Reads record `index` of a section. A record has `N` bytes; a line holds `PER_LINE` records.
     ///
     /// # Errors
-    /// [`FaultCode::Record`] if there is no record `index`; [`FaultCode::LineRange`] outside the memory.
+    /// [`FaultCode::Record`] if there is no record `index`; [`FaultCode::LineRange`] if its line is outside
+    /// the memory.
     #[inline(always)]
     pub fn record<'m, const N: usize, const PER_LINE: u32>(
         &self,

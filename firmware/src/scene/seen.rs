@@ -17,7 +17,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Arbitrary initial value.
+    /// Placeholder where no point is stored.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
     /// Marks a point that cannot be stored, because it lies behind specular surfaces, on a layer chosen at
     /// random or on an instance. Its eye path must be traced again.
@@ -29,7 +29,7 @@ impl Seen {
         self.triangle == u32::MAX
     }
 
-    /// The point of a hit; `None` on an instance, whose transform does not fit.
+    /// Creates the point of a hit; returns `None` on an instance, whose index does not fit.
     pub fn new(hit: &Hit) -> Option<Self> {
         let [_, v, w] = hit.intersection.barycentric;
         let TriangleId { index, instance } = hit.id;

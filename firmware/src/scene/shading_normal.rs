@@ -40,8 +40,8 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
 /// lies above the triangle: `g.m >= min(0.01, 0.9 g.outgoing)`. `outgoing` must lie above the triangle.
 ///
 /// Let `r (sin b, cos b)` be the projection of `outgoing` onto the plane of the two normals, at the angle `b`
-/// from the triangle's. A shading normal at the angle `a` from the triangle's gives the mirror direction the
-/// cosine `r cos(2 a - b)`.
+/// from the triangle's normal. A shading normal at the angle `a` from the triangle's normal gives the mirror
+/// direction the cosine `r cos(2 a - b)`.
 pub(super) fn bent(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     let height = geometric_normal.dot(outgoing);
     let least = min(0.9 * height, MIN_COSINE);

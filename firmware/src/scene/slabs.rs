@@ -28,11 +28,13 @@ struct SlabAxis {
     inverse: f32,
     /// True if the reciprocal is negative. The ray then reaches the upper face of a box first.
     is_downwards: bool,
-    /// Margin for the rounding of a ray in a group's space, as a distance along the ray; 0 in world space.
+    /// Margin, as a distance along the ray, for rounding errors of the ray's transform to a group's space; 0
+    /// in world space.
     slack: f32,
 }
 
-/// Margin for rounding errors, divided by the distance along the ray to the plane of the node's corner.
+/// Relative margin for rounding errors: a fraction of the distance along the ray to the plane of the node's
+/// corner.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// Minimum magnitude of a direction's component. It replaces smaller components, whose reciprocals would
@@ -54,8 +56,9 @@ impl Slabs {
         let [origin, direction] =
             [placed_point(rows, ray.origin.to_array()), placed_vector(rows, ray.direction.to_array())];
         let mut slabs = Self::new(&Ray { origin: origin.into(), direction: direction.into(), ..*ray });
-        // The ray meets the instance nearer than this. The rounding errors of its origin, of its direction
-        // over this distance, and of the triangles' vertices are relative to the terms of their sums.
+        // Upper bound of the distance at which the ray meets the instance. The rounding errors of the ray's
+        // origin, of its direction over this distance, and of the triangles' vertices are proportional to the
+        // terms of the sums that compute them.
         let far = 2.0 * (reach + max_component(ray.origin.abs()));
         for (axis, [a, b, c, d]) in slabs.axes.iter_mut().zip(rows) {
             let terms = (a.abs() + b.abs() + c.abs()) * (2.0 * far) + d.abs();

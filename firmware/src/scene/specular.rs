@@ -13,7 +13,7 @@ pub struct Specular {
     pub reflected: Vec3,
     /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
-    /// Unit direction of the specular reflection, if a microfacet of rough glass determines it; else zero,
+    /// Unit direction of the specular reflection if a microfacet of rough glass determines it. Zero stands
     /// for the mirror direction about the shading normal.
     pub beside: Vec3,
     /// Unit direction in which an eye path or a photon continues behind the surface after transmission.
@@ -23,8 +23,8 @@ pub struct Specular {
     /// Probability with which the base layer was chosen, if it is flat glass (a thin wall, or a face of a
     /// pane); else 0. Light passes flat glass without a change of direction or medium.
     pub straight: f32,
-    /// Ratio of radiances, in front to behind, at a transmittance of 1. It is `1 / n^2`, where `n` is the
-    /// index of refraction behind divided by the one in front; 1 for flat glass.
+    /// Ratio of the radiance in front to the radiance behind, at a transmittance of 1. It is `1 / n^2`, where
+    /// `n` is the index of refraction behind divided by the one in front; 1 for flat glass.
     pub radiance_scale: f32,
 }
 
@@ -101,7 +101,7 @@ pub(super) struct Glass {
     pub(super) base: Vec3,
     /// Absorption coefficient inside, 1/m; for a pane, the optical depth along the normal.
     pub(super) absorption: Vec3,
-    /// Transmitted fraction of the light that the Fresnel reflection leaves.
+    /// Fraction, 0 to 1, of the unreflected light that is transmitted.
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
@@ -149,7 +149,7 @@ impl Glass {
         (through * (1.0 - self.transmission), specular)
     }
 
-    /// Does `Self::at` for the outer side of a pane's face, which has the scattering of the whole pane. A
+    /// Does `Self::at` for the outer side of a pane's face. This side has the scattering of the whole pane. A
     /// face has the reflectance `R` at this angle, and the glass between the faces has the transmittance `a`.
     /// The pane transmits `(1 - R)^2 a / (1 - R^2 a^2)` and reflects `R + (1 - R)^2 R a^2 / (1 - R^2 a^2)`.
     #[inline(never)]

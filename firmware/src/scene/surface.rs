@@ -44,9 +44,10 @@ pub struct Surface {
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to; `None` if it is not an emitter.
     pub emitter: Option<u32>,
-    /// Probability of the random choices: of a material layer, and of the Lambertian part or the lobe; 1 if
-    /// none was made. `reflection` is already divided by this probability, and `specular` by the probability
-    /// of the layer. `emission` is divided by the probability of the choice of any layer that emits.
+    /// Probability of the random choices that were made: of a material layer, and of the Lambertian part or
+    /// the lobe; 1 without choices. `reflection` is already divided by this probability, and `specular` by
+    /// the probability of the layer. `emission` is divided by the probability that any layer with emission is
+    /// chosen.
     pub probability: f32,
     /// Fraction of the surface that is present: the probability with which a ray hits it; 1 without partial
     /// coverage.
@@ -62,7 +63,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Arbitrary initial value.
+    /// Placeholder, to be overwritten by a surface.
     pub const NOWHERE: Self = Self::white(Vec3::ZERO, Vec3::Z, 0.0);
 
     /// White Lambertian surface, seen along its normal.
@@ -208,7 +209,8 @@ fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
-/// Applies vertex attributes, textures and material to a surface. Its untextured emission must be set.
+/// Applies vertex attributes, textures and material to a surface. `surface.emission` must already be the
+/// untextured emission.
 #[inline(never)]
 fn finish(
     scene: &SceneImage,
@@ -253,7 +255,8 @@ fn finish(
     Ok(())
 }
 
-/// Minimum probability with which [`shade_by_parts`] chooses the Lambertian part, and the narrow lobe.
+/// Minimum probability of each of the two choices of [`shade_by_parts`]: the Lambertian part and the narrow
+/// lobe.
 const MIN_PART: f32 = 1.0 / 8.0;
 
 /// Sets the shading normal that the surface's reflection needs. The Lambertian part needs the normal of the
@@ -291,8 +294,8 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
 }
 
 /// Chooses one layer of a surface's material at random and sets the surface's scattering to that of the
-/// layer. If the far side is chosen (`Layer::Behind`), the emission becomes zero; otherwise it is divided
-/// by the probability that another layer is chosen.
+/// layer. If the far side is chosen (`Layer::Behind`), the emission becomes zero; otherwise it is divided by
+/// the probability that the far side is not chosen.
 #[inline(never)]
 fn take_layer(
     scene: &SceneImage,

@@ -56,7 +56,7 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// On one axis of a texture, the two adjacent texels between whose centres a coordinate lies.
+/// Two adjacent texels on one axis of a texture. The sampled coordinate lies between their centres.
 struct TexelPair {
     /// Indices of the two texels.
     texels: [u32; 2],

@@ -39,7 +39,7 @@ pub struct Hit {
     pub intersection: Intersection,
     /// The triangle, in world space.
     pub triangle: Triangle,
-    /// Which triangle it is.
+    /// Index of the triangle, and of its instance.
     pub id: TriangleId,
 }
 
@@ -75,7 +75,7 @@ impl RayFrame {
     }
 
     /// Shears a corner, given on the permuted axes. Returns the sheared x and y relative to the ray's origin,
-    /// and the depth, z less the origin's z, not yet divided by the direction's z.
+    /// and the depth: the corner's z minus the origin's z, not yet divided by the direction's z.
     #[inline(always)]
     fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let [origin_x, origin_y, origin_z] = self.origin;
@@ -208,7 +208,8 @@ impl ShearedLeaf<'_> {
     }
 }
 
-/// Sheared x and y of one corner of every triangle: the coordinates of the vertices `vertices`.
+/// Sheared x and y of one corner of every triangle. `vertices` has the corners' indices in the leaf's list of
+/// vertices.
 #[inline(always)]
 fn permute(
     isa: impl Isa,

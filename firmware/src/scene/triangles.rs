@@ -30,10 +30,10 @@ pub(super) fn read_triangle(
     Ok(triangle)
 }
 
-/// Reads the instance in line `index` of the leaves.
+/// Reads the instance that is stored in line `index` of the leaves' section.
 ///
 /// # Errors
-/// [`FaultCode::Record`] if the line is a leaf with triangles, or there is none.
+/// [`FaultCode::Record`] if the line is a leaf with triangles, or if there is no such line.
 pub(super) fn read_instance(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -43,7 +43,7 @@ pub(super) fn read_instance(
     Instance::read(line).ok_or(Fault { code: FaultCode::Record, detail: index })
 }
 
-/// Writes a leaf of an instance's group, moved to world space, to `moved`.
+/// Transforms a leaf of an instance's group to world space and writes it to `moved`.
 #[cold]
 #[inline(never)]
 pub(super) fn place_leaf(line: &[u8; LINE_BYTES], instance: &Instance, moved: &mut [u8; LINE_BYTES]) {

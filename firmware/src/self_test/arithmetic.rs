@@ -1,7 +1,8 @@
-//! Arithmetic that pictures depend on. Its results are equal, bit for bit, on every processor.
+//! Self-test of the arithmetic that pictures depend on. Its results must be equal, bit for bit, on every
+//! processor.
 //!
-//! A host sends operands and computes the same expressions. A chip whose results differ flushes denormal
-//! numbers to zero, uses another rounding mode, or runs code with fused multiply-adds.
+//! A host sends operands and computes the same expressions itself. If a chip's results differ, the chip
+//! flushes denormal numbers to zero, uses another rounding mode, or runs code with fused multiply-adds.
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 

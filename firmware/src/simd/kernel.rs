@@ -9,8 +9,8 @@ pub const HALF_LANES: usize = LANES / 2;
 
 /// An instruction set. A value of an implementing type is the proof that the processor supports it.
 pub trait Isa: Copy {
-    /// Number of lanes that a loop computes if only the first `used` are needed: [`LANES`] where all lanes
-    /// cost no more.
+    /// Number of lanes that a loop computes if only the first `used` are needed. It is [`LANES`] if all lanes
+    /// cost no more than `used` lanes.
     fn lanes(self, used: usize) -> usize;
 
     /// Bit mask of the lanes whose value is below `bound`. Lane 0 is the lowest bit.

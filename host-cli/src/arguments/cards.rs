@@ -120,10 +120,10 @@ pub(crate) struct MemoryOption {
 }
 
 impl MemoryOption {
-    /// Returns `address` with its card memory set to `--card-memory` if the card is emulated. By default a
-    /// reference or large chip has a quarter of the machine's free memory, but at least the memory of its
-    /// kind; the host itself takes up to four times a card's memory. Other cards keep the memory of their
-    /// kind.
+    /// Returns `address` with its card memory set to `--card-memory` if the card is emulated. Without this
+    /// option, a reference or large chip has a quarter of the machine's free memory (the host itself takes up
+    /// to four times a card's memory), but at least the memory of its kind. Other cards keep the memory of
+    /// their kind.
     pub(super) fn of(&self, address: CardAddress) -> CardAddress {
         self.with_free(free_memory(), address)
     }

@@ -51,14 +51,14 @@ impl PictureOutput {
         (self.path.as_os_str() != STANDARD_OUTPUT).then_some(&self.path)
     }
 
-    /// Name for messages: the path, or that of standard output.
+    /// Name of the destination in messages: the path, or `standard output`.
     pub(crate) fn name(&self) -> String {
         self.file().map_or("standard output".to_owned(), |path| path.display().to_string())
     }
 }
 
-/// Picture formats that are not written: the suffixes, the name, and a remedy. The remedy is an argument for
-/// `-o`, mostly followed by a command that converts the file.
+/// Picture formats that photoncard does not write, each with its suffixes, its name and a remedy: an argument
+/// for `-o`, mostly followed by a command that converts the file.
 const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["jpg", "jpeg", "jpe"], "JPEG", "out.png, then: magick out.png out.jpg"),
     (&["webp"], "WebP", "out.png, then: magick out.png out.webp"),

@@ -87,8 +87,8 @@ pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     numbered(pattern, last)
 }
 
-/// Path of a frame's file: the number, padded with zeros to the length of the last run of `#` in the file
-/// name, replaces this run. `None` without a `#`.
+/// Replaces the last run of `#` in the file name of `pattern` by the frame's number, padded with zeros to the
+/// length of the run. `None` without a `#`.
 pub(crate) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     let name = pattern.file_name()?.to_str()?;
     let end = name.rfind('#')? + 1;

@@ -115,7 +115,7 @@ impl Arguments {
     }
 }
 
-/// Inserts `view --open` before a first argument that is a glTF file.
+/// Inserts `view --open` before the first argument if this is a glTF file.
 fn of_scene_alone(mut given: Vec<OsString>) -> Vec<OsString> {
     let is_scene = |word: &OsString| {
         let ending = Path::new(word).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());

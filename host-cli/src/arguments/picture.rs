@@ -25,8 +25,8 @@ enum Size {
 }
 
 impl Size {
-    /// Returns the picture's width and height, pixels. One that is not stated follows from the camera's
-    /// aspect ratio.
+    /// Returns the picture's width and height, pixels. If only one side is stated, the other follows from the
+    /// camera's aspect ratio.
     fn of(self, camera: Option<&Camera>) -> (u32, u32) {
         let aspect = camera.and_then(|camera| camera.aspect);
         match self {
@@ -151,7 +151,8 @@ fn size(text: &str) -> Result<Size, String> {
     })
 }
 
-/// Returns `percent` of the default longer side, [`SIDE`], rounded to pixels; at least 1.
+/// Parses `percent`, and returns this percentage of [`SIDE`] as pixels, at least 1. `None` unless it is
+/// positive.
 fn percent_of_side(percent: &str) -> Option<u32> {
     let percent = percent.parse().ok().filter(|percent: &f32| *percent > 0.0 && percent.is_finite())?;
     Some(((SIDE as f32 * percent / 100.0 + 0.5) as u32).max(1))

@@ -1,5 +1,5 @@
-//! The option `--prepared`, and the steps of a render farm's job that take each option of `photoncard
-//! render`.
+//! Option `--prepared`, and the assignment of the options of `photoncard render` to the steps of a render
+//! farm's job.
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Args, Command, Id};
@@ -28,7 +28,7 @@ pub(crate) enum Step {
 }
 
 impl Step {
-    /// Returns the steps that take an option, by its heading in the help.
+    /// Returns the steps that take `option`. Most options are assigned by their heading in the help.
     pub(crate) fn of(option: &Arg) -> Self {
         match option.get_id().as_str() {
             // By their headings, if they have any, these options would be of other steps.

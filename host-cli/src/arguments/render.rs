@@ -96,7 +96,7 @@ impl RenderOptions {
     }
 
     /// Returns the settings before the pilot render. If the render adds to kept samples, the settings that no
-    /// option states are those of these samples.
+    /// option states are taken from their file.
     ///
     /// # Errors
     /// If the file of kept samples cannot be read.
@@ -134,8 +134,8 @@ impl RenderOptions {
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Returns the time and noise at which a picture's passes end. The time is that of `aim`, less the
-    /// expected time of a denoiser, and less `elapsed`, the time spent before the passes.
+    /// Returns the aim of a picture's passes: the noise of `aim`, and its time minus the expected time of a
+    /// denoiser and minus `elapsed`, the time spent before the passes.
     pub(crate) fn aim_of_passes(&self, aim: Aim, settings: &RenderSettings, elapsed: Duration) -> Aim {
         let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);

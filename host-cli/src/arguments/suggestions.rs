@@ -141,7 +141,7 @@ pub(super) fn command_of(program: Command, given: &[String]) -> String {
 }
 
 impl Word {
-    /// Returns whether the remedy applies to `command` itself or to a command of which it is a subcommand.
+    /// Returns whether the remedy applies to `command` or to a parent command of `command`.
     fn is_of(&self, command: &str) -> bool {
         let is_within = |of: &&str| {
             command.strip_prefix(*of).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -149,7 +149,7 @@ impl Word {
         self.commands.is_empty() || self.commands.iter().any(is_within)
     }
 
-    /// Text of the remedy. If it is not for `command`, names the commands that it is for.
+    /// Text of the remedy, preceded by the names of its commands if `command` is not among them.
     fn remedy_for(&self, command: &str) -> String {
         if self.is_of(command) {
             return self.remedy.to_owned();

@@ -80,8 +80,8 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
-    /// Measurement with the settings of these options and the first of the stated caches; the sweep varies
-    /// this point. `name` is the name of the scene.
+    /// Point (measurement) that the sweep varies: it has the settings of these options and the first of the
+    /// stated caches. `name` is the name of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
             &self.settings;
@@ -131,7 +131,7 @@ fn axis(text: &str) -> Result<Axis, String> {
     Ok(Axis { name: name.to_owned(), values })
 }
 
-/// Checks that each value of `--vary cache=` is a complete cache setting, not a piece of one cut at a comma.
+/// Checks that no value of `--vary cache=` is a piece of a cache setting that was cut at its commas.
 fn check_parts(values: &[String]) -> Result<(), String> {
     let part = |value: &String| value.split_once('=').map(|(part, _)| part.to_owned());
     let parts: Vec<_> = values.iter().map(part).collect();

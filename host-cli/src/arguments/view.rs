@@ -84,8 +84,8 @@ impl ViewOptions {
     }
 }
 
-/// Parses the address of the page: an IP address or `localhost`, and a port. The look-up of other host names
-/// may take long.
+/// Parses the address of the page: an IP address or `localhost`, and a port. Other host names are errors,
+/// because their look-up may take long.
 fn listen(text: &str) -> Result<SocketAddr, String> {
     let local = || Some((Ipv4Addr::LOCALHOST, text.strip_prefix("localhost:")?.parse().ok()?).into());
     let address = text.parse().ok().or_else(local);

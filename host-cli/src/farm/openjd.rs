@@ -34,8 +34,9 @@ fn name(job: &Job) -> String {
     format!("photoncard {name}")
 }
 
-/// Step that renders all parts. With frames, one `photoncard` process renders one part of each frame in a
-/// chunk. Without frames, each part has its own process; the parts of a chunk follow each other.
+/// Step that renders all parts. A task's chunk is a range of consecutive frames or, without frames, of
+/// consecutive parts. With frames, one `photoncard` process renders one part of each frame in the chunk.
+/// Without frames, one process after another renders a part of the chunk.
 fn render(job: &Job) -> Value {
     let chunks = json!({"defaultTaskCount": 1, "rangeConstraint": "CONTIGUOUS"});
     let parts = format!("1-{}", job.parts);

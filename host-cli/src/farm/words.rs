@@ -67,7 +67,7 @@ impl Words {
         Ok(words)
     }
 
-    /// Returns the lists to which the words of an option are appended; no list for an option of the job
+    /// Returns the lists to which the words of an option are appended; an empty list for an option of the job
     /// itself, such as `--parts`. `None` for an option that is not allowed in a job.
     fn rooms(&mut self, option: &Arg) -> Option<Vec<&mut Vec<String>>> {
         if OF_NO_JOB.contains(&option.get_id().as_str()) {

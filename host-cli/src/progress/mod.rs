@@ -33,8 +33,8 @@ pub(crate) struct Progress {
     percent: Option<Percent>,
 }
 
-/// Time, seconds, in which a phase before the tiles prints only its last line. It starts with the phase, and
-/// applies without a terminal.
+/// Time from the start of a phase, seconds, in which only the phase's last line is printed. Used without a
+/// terminal, for the phases before the tiles.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {

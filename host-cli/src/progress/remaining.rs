@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 /// Estimates the remaining time of pieces of work that `workers` process in parallel.
 ///
 /// Each worker processes one piece after another. The last completion times of all workers therefore sum to
-/// the time spent on finished pieces. Let `n` be the number of finished pieces, `N` that of all pieces, and
-/// `t` the mean of the last `min(n, workers)` completion times. The work ends at about `t N / max(n,
-/// workers)`. Between completions the estimate counts down, until a piece takes longer than the mean. Pieces
-/// that were finished before the start count as done, but not for the speed.
+/// the time spent on finished pieces. Let `n` be the number of pieces finished since the start, `N` the sum
+/// of `n` and the number of pieces left, and `t` the mean of the last `min(n, workers)` completion times. The
+/// work ends at about `t N / max(n, workers)`. Between completions the estimate counts down, until a piece
+/// takes longer than the mean.
 pub(crate) struct Remaining {
     workers: usize,
     /// Number of pieces finished before the start.
@@ -52,8 +52,8 @@ impl Remaining {
             mean * (finished + left) as f64 / finished.max(self.workers as u64) as f64
         };
         let known = mean(self.completions.iter().copied());
-        // `overdue` is the mean with one more piece, which is finished at `now` at the earliest. This piece
-        // replaces the oldest completion if each worker has one.
+        // `overdue` is the mean with one more piece, as if it were finished at `now`. This piece replaces the
+        // oldest completion if each worker has one.
         let skipped = (self.completions.len() + 1).saturating_sub(self.workers);
         let overdue = mean(self.completions.iter().copied().skip(skipped).chain([now]));
         let expected = end(known, finished, left).max(end(overdue, finished + 1, left - 1));
@@ -100,14 +100,14 @@ mod tests {
         found
     }
 
-    /// `count` costs from `low` to `high` seconds, by the golden ratio's additive sequence.
+    /// Returns `count` costs from `low` to `high` seconds, varied by the golden ratio's additive recurrence.
     fn varied(count: usize, low: f64, high: f64) -> Vec<f64> {
         (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
     }
 
-    /// Checks the estimates after a fifth of the time and before the last `tail` seconds. Each must have a
-    /// relative error of at most `share`. Each must also differ by at most `share`, relatively, from the
-    /// previous estimate less the time since then.
+    /// Checks all estimates from a fifth of the time to `tail` seconds before the end. Each must have a
+    /// relative error of at most `share`. Its relative difference from the previous estimate, less the time
+    /// since then, must also be at most `share`.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;

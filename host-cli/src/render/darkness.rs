@@ -8,7 +8,7 @@ use crate::console::say;
 /// Minimum fraction of black pixels, among the pixels that show a surface, for a message.
 const MANY: f64 = 0.5;
 
-/// Facts about a scene and its view that explain darkness.
+/// Facts about a scene and its view that may explain a dark picture.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Circumstances {
     /// True if Blender's exporter wrote the file and the scene has no environment.
@@ -25,7 +25,8 @@ impl Circumstances {
     }
 }
 
-/// Prints the probable reason if nothing is seen, or if at least half of what is seen is black.
+/// Prints the probable reason if no pixel shows a surface, or if at least half of the pixels that show one
+/// are black.
 pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     let pixels = film.pixels().map(|pixel| (pixel.radiance, pixel.depth));
     if let Some(line) = line(pixels, circumstances) {

@@ -76,7 +76,7 @@ fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Fa
 }
 
 /// Returns the outputs if no picture is stated: a PNG beside the scene file. `None` if a picture is stated or
-/// a part is rendered. An existing file of that name is replaced only if photoncard wrote it.
+/// a part is rendered. An existing file of the PNG's name is an error unless photoncard wrote it.
 pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
     let has_frames = options.frames.numbers().is_some();
     let outputs = options.outputs.beside(&options.scene.path, has_frames);

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{files, messages};
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
-/// Settings that a render finds itself when they are not stated, and then writes into the provenance.
+/// Settings that a render computes if they are not stated, and then writes into the provenance.
 const FOUND: [&str; 2] = ["max-distance", "view"];
 
 /// Returns whether `--resume` is given and all files of this frame exist.
@@ -73,8 +73,8 @@ fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     outputs.pictures.iter().find(|picture| !is_intact(picture)).map(|picture| &*picture.path).or(stats)
 }
 
-/// Provenance of an existing picture; `None` if its sample type, tone mapping or part is not that of the
-/// outputs.
+/// Provenance of an existing picture; `None` if its sample type, tone mapping or part differs from that of
+/// `outputs` and `options`.
 fn provenance(
     options: &RenderOptions,
     outputs: &OutputOptions,

@@ -65,7 +65,7 @@ struct Sequence<'a> {
     rest: Option<Scene>,
     renderer: Renderer,
     progress: Progress,
-    /// Time spent on reading the scene since the statistics of the last frame, seconds.
+    /// Time of reading the scene that is not yet part of a frame's statistics, seconds.
     scene_seconds: f64,
 }
 

@@ -59,7 +59,7 @@ pub(super) fn say_sparse(statistics: &Statistics) {
     }
 }
 
-/// Prints a warning about tiles that are far brighter than any surface and that no second card has verified.
+/// Prints a warning about tiles far brighter than any surface, unless a second card has verified them.
 pub(super) fn say_dazzling(statistics: &Statistics) {
     let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
     if *dazzling_tiles > 0 {
@@ -135,9 +135,10 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// Messages about a pilot render's results for settings that no option states. One states the squared error
-/// with photons guided to the camera, as a ratio to that with as many unguided photons. Others state that the
-/// bounds of the quality or of `--time` have reduced the number of photons or of gather rays.
+/// Messages about the results of a pilot render. One states the squared error with photons guided to the
+/// camera, divided by the error with as many photons for the whole scene. Others state that the bounds of the
+/// quality or of `--time` have reduced the number of photons or of gather rays, if no option states this
+/// number.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };

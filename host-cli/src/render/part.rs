@@ -9,7 +9,8 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::failure::Failure;
 use crate::shell;
 
-/// Checks that a render of a part has one output, a part file, and that another render has no part file.
+/// Checks that a render with `--part` has one output, a part file, and that any other render has no part
+/// file.
 pub(super) fn check(part: Option<Part>, pictures: &[PictureOutput]) -> Result<(), Failure> {
     let are_parts = pictures.iter().any(|picture| picture.format == PictureFormat::Part);
     match part {
@@ -44,7 +45,8 @@ pub(crate) fn command(head: &PartHead, part: Part) -> String {
     shell::command(with_part(head, part))
 }
 
-/// Returns the arguments in a part's header, changed to render `part`; of several frames, the header's alone.
+/// Returns the arguments in a part's header, changed to render `part`: of the header's frame alone, if it has
+/// one.
 fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     let frame = head.settings.get("frame").map(ToString::to_string);
     let changed = |option: &str, value: &str| match option {

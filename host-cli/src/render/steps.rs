@@ -38,7 +38,7 @@ pub(super) struct Finished {
     pub(super) rendering: Rendering,
     /// Time of reading the scene, seconds.
     pub(super) scene_seconds: f64,
-    /// File names and options that determine the scene, with the number of a frame.
+    /// File names and options that determine the scene, and the frame's number if there is one.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
     /// Settings that a pilot render has chosen; `None` without a pilot render.

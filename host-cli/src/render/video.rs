@@ -22,8 +22,8 @@ pub(super) struct Video {
 /// Replaces each video among the outputs by the PNG pictures that it is encoded from, and returns the videos.
 ///
 /// # Errors
-/// If no frames are stated, a video's name contains `#` or is that of an input, a file at the path of one of
-/// the PNG pictures was not written by photoncard, or ffmpeg cannot be started.
+/// If no frames are stated; if a video's name contains `#`, or is that of an input; if a file that photoncard
+/// did not write has the name of one of the PNG pictures; or if ffmpeg cannot be started.
 pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let mut videos = Vec::new();
     for output in options.outputs.pictures.iter_mut().filter(|output| output.format == PictureFormat::Video) {
@@ -65,7 +65,7 @@ fn of_each_frame(path: &Path) -> Failure {
     refusal(text, &format!("leave the # out: -o {one}; or write the frames alone: -o {frames}"))
 }
 
-/// Path of one video: the pattern without runs of `#`, and without the dot before a run.
+/// Path for a single video: `pattern` without its runs of `#`, and without the dot before each run.
 fn as_one(pattern: &Path) -> PathBuf {
     let name = pattern.file_name().unwrap_or_default().to_string_lossy();
     let kept: Vec<_> = name.split('.').map(|word| word.replace('#', "")).collect();

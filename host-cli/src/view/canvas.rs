@@ -165,7 +165,7 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     }
 }
 
-/// Column and row of a tile's corner, and its number of pixels.
+/// Column and row of a tile's upper left corner, and the tile's number of pixels.
 type Area = (u32, u32, u64);
 
 /// Tiles of the newest requested picture that has any.
@@ -223,7 +223,8 @@ impl Canvas {
         self.retain(|patch| patch.origin == origin);
     }
 
-    /// Removes a revoked tile.
+    /// Removes the tile `id` of pass `origin`, which was revoked: its card was outvoted or sent wrong
+    /// messages.
     pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
         self.retain(|patch| !(patch.origin == origin && patch.tile.tile().id == id));
     }
@@ -242,8 +243,8 @@ impl Canvas {
         self.patches.get(index).cloned()
     }
 
-    /// Depth at pixel `at` in the newest tile of request `version` there, metres; `None` where no surface is
-    /// seen.
+    /// Depth at pixel `at`, metres, in the newest tile of request `version` that covers the pixel; `None`
+    /// where no surface is seen.
     pub(super) fn depth(&self, version: u32, at: [u32; 2]) -> Option<f32> {
         let mut of_wish = self.patches.iter().rev().filter(|(_, patch)| patch.origin.version == version);
         let seen = of_wish.find_map(|(_, patch)| patch.pixel(at))?;

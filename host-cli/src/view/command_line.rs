@@ -31,7 +31,7 @@ pub(super) fn quoted(words: &[String]) -> String {
     words.iter().map(|word| shell::quoted(word)).collect::<Vec<_>>().join(" ")
 }
 
-/// Path that clap does not take for an option: `./` precedes a dash.
+/// Inserts `./` before a path that begins with a dash, which clap would take for an option.
 fn path(path: &str) -> String {
     if path.starts_with('-') { format!("./{path}") } else { path.to_owned() }
 }

@@ -1,8 +1,9 @@
 //! Access control: checks of a request's address, its origin and its token.
 //!
-//! A page of another site must not reach the view. Browsers state in `Host` the name that they resolved. All
+//! A page of another site must not reach the view. Browsers state in `Host` the name that they resolved: all
 //! names but this machine's are refused, against DNS rebinding. Browsers state in `Origin` the site whose
-//! script opens a connection. Only people who have seen the printed address know the token.
+//! script opens a connection: other sites are refused. Only people who have seen the printed address know the
+//! token.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 

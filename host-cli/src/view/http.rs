@@ -121,7 +121,8 @@ impl Head {
     }
 }
 
-/// Sends a file of the page. `host` is the request's `Host`; the page may open a WebSocket to it.
+/// Sends a file of the page. The response allows the page to open a WebSocket to `host`, the request's
+/// `Host`.
 pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
     // Not all browsers let `'self'` stand for the server's WebSocket.
     let policy = format!(

@@ -40,7 +40,7 @@ pub(super) struct Hub {
     is_over: Arc<AtomicBool>,
     is_card_back: AtomicBool,
     settled: Mutex<Option<Arc<Settled>>>,
-    /// Folder of saved pictures; the lock is held while one is written.
+    /// Folder of saved pictures, locked while a picture is written.
     folder: Mutex<Option<Folder>>,
     start: Instant,
 }

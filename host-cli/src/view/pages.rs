@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::canvas::{Canvas, Patch, Shown};
 
-/// Maximum total size of the tiles that a page was sent and has not acknowledged, bytes. If it has
-/// acknowledged all, one larger tile is sent as well.
+/// Maximum total size of the tiles that a page was sent and has not acknowledged, bytes. A larger tile is
+/// sent once all tiles before are acknowledged.
 const MAX_ON_THE_WAY: u64 = 4 << 20;
 /// Maximum number of answers that wait for a page. Older ones are dropped.
 const MAX_REPLIES: usize = 64;
@@ -25,7 +25,7 @@ pub(super) enum Outgoing {
     Tile(Arc<Patch>, Shown),
 }
 
-/// Numbers of changes: of the view's state, and of the cards' states.
+/// Numbers of changes so far: of the view's state, and of the states of the cards.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Revisions {
     pub(super) state: u64,
@@ -37,8 +37,8 @@ pub(super) struct Revisions {
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
-    /// Number of the request in the last state message that was sent. The state message of a request, which
-    /// has the picture's size, precedes its tiles.
+    /// Number of the request in the last state message that was sent. The state message of a request states
+    /// the picture's size, and therefore precedes the request's tiles.
     told: u32,
     shown: Shown,
     /// Number of the next tile to send, in the [`Canvas`].

@@ -154,7 +154,8 @@ impl<'a> Painter<'a> {
         Ok(denoised.ok())
     }
 
-    /// Renders a picture by passes, each of which doubles the number of samples up to the requested one.
+    /// Renders a picture in passes, each with twice the samples of the pass before, up to the requested
+    /// number.
     fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
@@ -212,8 +213,8 @@ struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
     is_preparing: AtomicBool,
-    /// Card that rendered a tile, and number of lines that it read from DRAM for the tile, by the tile's
-    /// number. An entry is removed when the tile's pixels arrive.
+    /// By tile number: name of the card that rendered the tile, and number of lines that it read from DRAM.
+    /// An entry is removed when the tile's pixels arrive.
     cards: Mutex<HashMap<u32, (String, Option<u64>)>>,
 }
 

@@ -21,8 +21,8 @@ const RAYS: [u32; 2] = [6, 16];
 const IRRADIANCE_ERROR: f32 = 1.0;
 
 impl View {
-    /// Returns the next pass to render. The error is the time until which to wait; `None` to wait for a
-    /// change.
+    /// Returns the next pass to render. `Err(Some(time))` means to wait until this time, `Err(None)` to wait
+    /// for a change.
     pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
         let work = match self.refinement.next(now) {
             Next::Work(work) => work,
@@ -64,7 +64,8 @@ impl View {
         }
     }
 
-    /// Removes a revoked tile.
+    /// Removes the tile `id` of pass `origin`, which was revoked: its card was outvoted or sent wrong
+    /// messages.
     pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
         self.canvas.revoke(origin, id);
     }

@@ -1,9 +1,9 @@
 //! Order of a view's passes, as a state machine without threads, clock or pixels. It begins with the coarsest
 //! picture, and ends with the final picture, which equals that of `photoncard render`.
 //!
-//! A newer [request](super::wish) stops the running pass of an older one, with two exceptions. If the first
-//! pass of a request was stopped, the next first pass runs to its end: pages show pictures however fast
-//! requests follow each other. Photons that the newest request can use are traced to their end.
+//! A newer [request](super::wish) stops the running pass of an older one, with two exceptions. After a first
+//! pass was stopped, the next first pass runs to its end: pages show pictures however fast requests follow
+//! each other. A pass is not stopped while it traces photons that the newest request can use.
 
 use std::time::Duration;
 
@@ -17,13 +17,14 @@ const MAX_PAUSE: Duration = Duration::from_secs(8);
 
 /// Side of the squares in the first pass, pixels: one pixel is rendered for each square.
 pub(super) const COARSEST: u32 = 8;
-/// Maximum expected time of the coarse pass with every pixel, for which it directly follows the first pass.
-/// Pictures in between would hardly be seen.
+/// Maximum expected time of the coarse pass with every pixel for which it directly follows a pass with
+/// squares larger than [`FINE`]. Pictures in between would hardly be seen.
 const SEEN: Duration = Duration::from_millis(800);
-/// Maximum expected time of the coarse pass with every pixel, for which the pass with every second column and
-/// row, a quarter of the work, is left out.
+/// Maximum expected time of the coarse pass with every pixel for which it directly follows a pass with
+/// squares of at most [`FINE`]. This leaves out the pass with every second column and row, a quarter of the
+/// work.
 const AWAITED: Duration = Duration::from_secs(4);
-/// Maximum side of the squares for which the limit is `AWAITED`, pixels; for greater sides it is `SEEN`.
+/// Maximum side of the squares of a pass, pixels, after which the limit is [`AWAITED`] instead of [`SEEN`].
 const FINE: u32 = 4;
 
 /// Pass on the way to the final picture.
@@ -52,8 +53,8 @@ fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     }
 }
 
-/// Side of the squares after a pass of side `step` that took `time`: 1 if the pass with every pixel, at the
-/// same time per pixel, is within the limit; otherwise half of `step`.
+/// Side of the squares of the pass after one of side `step` that took `time`: 1 if `time * step^2`, the
+/// expected time of the pass with every pixel, is within the limit; otherwise `step / 2`.
 fn next_step(step: u32, time: Duration) -> u32 {
     let limit = if step > FINE { SEEN } else { AWAITED };
     if time * (step * step) <= limit { 1 } else { step / 2 }

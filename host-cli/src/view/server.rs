@@ -16,7 +16,7 @@ use super::http::{Head, Refusal, accept_socket, send_file};
 use super::hub::Hub;
 use super::socket;
 
-/// Maximum number of connections that the gate has accepted.
+/// Maximum number of open connections whose requests the gate has accepted.
 const MAX_CONNECTIONS: usize = 16;
 /// Maximum number of strangers: connections whose request's head is not read yet.
 const MAX_STRANGERS: usize = 16;

@@ -83,7 +83,7 @@ pub(super) struct View {
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
-    /// Number of the last message that was accepted from the page that steers.
+    /// Number of the last accepted message of the page that steers (controls the view).
     message: u64,
     pub(super) revisions: Revisions,
 }
@@ -215,7 +215,7 @@ impl View {
         Ok(Effect::Nothing)
     }
 
-    /// Processes a request that only the page that steers may make.
+    /// Processes a request that is accepted only from the page that steers.
     fn turn(&mut self, request: Request, now: Duration) -> Result<(), String> {
         let mut wish = self.wish.clone();
         let mut moves = None;
@@ -272,8 +272,8 @@ impl View {
         Ok(())
     }
 
-    /// Drops tiles that pages must not show any more. Tiles of an older request whose first pass must be
-    /// completed stay until the newest request has a tile.
+    /// Drops the tiles that pages must not show any more. If a pass of an older request may run to its end,
+    /// the tiles of that request stay until the newest request has a tile.
     pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),
@@ -337,7 +337,7 @@ impl View {
         self.revisions.cards += 1;
     }
 
-    /// Next message to a page: text, or a tile as `Err`.
+    /// Takes the next message to a page: `Ok` for text, `Err` for a tile; `None` if there is no message.
     pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
         let is_settled = self.refinement.is_settled();
         let version = self.refinement.version();
@@ -365,8 +365,8 @@ impl View {
         command_line::words(options, *quality, *finish, &self.wish)
     }
 
-    /// State as a message to a page. `has_all` is true if the page has all tiles: only then `settled` may be
-    /// true.
+    /// State as a message to a page. Its field `settled` can be true only if `has_all`: the page has all
+    /// tiles.
     fn describe(&self, has_all: bool) -> Value {
         let settings = &self.wish.settings;
         // The camera is valid: it was checked when the wish was made.

@@ -157,7 +157,8 @@ impl Sketch {
         }))
     }
 
-    /// Scene of the sketch with the assignments of a request.
+    /// Returns the sketch's scene after the assignments of a request, whose settings and camera are also
+    /// checked.
     ///
     /// # Errors
     /// If an assignment, a setting or the camera is invalid, or no light is left.

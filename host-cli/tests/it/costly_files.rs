@@ -60,7 +60,7 @@ fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     })
 }
 
-/// Bytes of `count` vertices, each at another position.
+/// Positions of `count` vertices, all different, as bytes of a glTF buffer.
 fn places(count: u32) -> Vec<u8> {
     let scattered = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
     (0..3 * count).flat_map(|i| scattered(i).to_le_bytes()).collect()

@@ -240,7 +240,7 @@ fn a_resumed_sequence_renders_unfinished_frames() {
     }
 }
 
-/// Samples are added with the settings that a pilot chose for the kept ones, whichever frames are finished.
+/// Further samples have the settings that a pilot chose for the kept samples, whichever frames are finished.
 #[test]
 fn samples_of_frames_are_added_with_the_settings_of_the_kept_ones() {
     let room = Room::new();

@@ -24,7 +24,7 @@ fn scene_info_prints_the_contents_of_a_scene() {
     assert!(outcome.stdout.ends_with('\n'));
 }
 
-/// Features that are used are printed with their values, others are named as ignored.
+/// glTF features that renders use are printed with their values; other features are named as ignored.
 #[test]
 fn scene_info_prints_textures_lights_and_ignored_features() {
     let outcome = Room::new().run(&[

@@ -114,7 +114,7 @@ fn a_sweep_measures_every_combination_of_values() {
     assert!(page.contains("12.5 GB/s and 80 GFLOPS, reads of 100 ns, 128 tasks in flight"), "the provenance");
 }
 
-/// The requests of a sweep over all tiles equal those of a render with counters.
+/// The numbers of memory requests of a sweep over all tiles equal those of a render with `--counters`.
 #[test]
 fn the_counts_of_a_sweep_over_all_tiles_equal_those_of_a_render() {
     let room = room_with_a_scene();

@@ -1,4 +1,4 @@
-//! Tone-mapped PNGs: those of a render equal those of `photoncard tonemap` for its EXR.
+//! Tone-mapped PNGs: a render writes the same PNG as `photoncard tonemap` for the EXR of the render.
 
 use std::path::Path;
 
@@ -25,7 +25,8 @@ fn tonemap(room: &Room, options: &[&str]) -> Outcome {
     room.run(&[&["tonemap"], options].concat())
 }
 
-/// One render writes both files. The PNG equals that of the EXR, for every tone mapping.
+/// One render writes an EXR and a PNG. `photoncard tonemap` makes the same PNG of this EXR, for every
+/// mapping.
 #[test]
 fn the_png_of_a_render_equals_that_of_its_exr() {
     let room = room_with_a_scene();

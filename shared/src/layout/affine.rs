@@ -19,8 +19,8 @@ pub fn placed_vector(rows: &Rows, [x, y, z]: [f32; 3]) -> [f32; 3] {
     [component(a), component(b), component(c)]
 }
 
-/// Image of a normal under the inverse of an affine transform, of any length: the product of the vector and
-/// the linear part.
+/// Image of a normal under an affine transform, given the inverse of the transform: the transposed linear
+/// part of `inverse` times the normal. The result is not normalised.
 #[inline(always)]
 pub fn placed_normal(inverse: &Rows, [x, y, z]: [f32; 3]) -> [f32; 3] {
     let [[a, b, c, _], [d, e, f, _], [g, h, i, _]] = *inverse;

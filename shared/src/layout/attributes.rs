@@ -25,7 +25,7 @@ pub struct LeafAttributes {
 const TWO_SETS: u32 = 1 << 31;
 
 impl LeafAttributes {
-    /// Reads a stored entry; `None` if the leaf has no attributes.
+    /// Decodes a leaf's entry; `None` if the leaf has no attributes.
     #[inline(always)]
     pub fn read(entry: u32) -> Option<Self> {
         let two_sets = entry & TWO_SETS != 0;
@@ -37,8 +37,8 @@ impl LeafAttributes {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// Returns the index of the [`Attributes`] record of triangle `slot` of the leaf that holds texture
-    /// coordinate set `set`, 0 or 1. The record of set 0 also holds the triangle's other attributes.
+    /// Returns the index of the [`Attributes`] record that holds texture coordinate set `set`, 0 or 1, of the
+    /// leaf's triangle `slot`. The record of set 0 also holds the triangle's other attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };

@@ -21,7 +21,6 @@ const COORDINATE_BYTES: usize = 4 * LEAF_VERTICES;
 const CORNERS: usize = 3 * COORDINATE_BYTES;
 const MATERIALS: usize = CORNERS + 12;
 const MATERIAL_BYTES: usize = 3;
-/// Maximum number of materials of a leaf.
 const LEAF_MATERIALS: usize = 2;
 const SECOND_MATERIAL: usize = MATERIALS + MATERIAL_BYTES * LEAF_MATERIALS;
 const COUNTS: usize = SECOND_MATERIAL + 1;
@@ -50,7 +49,7 @@ const fn in_last_byte(flag: u32) -> u8 {
 #[derive(Clone, Copy)]
 pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 
-/// Triangle with its material. Its corners are counter-clockwise seen from the front.
+/// A triangle and its material. The corners are counter-clockwise, seen from the front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// Positions of the corners, metres.
@@ -180,7 +179,7 @@ impl BvhLeaf<'_> {
         self.0.get(index).copied().unwrap_or(0)
     }
 
-    /// The leaf with its vertices moved by an affine transform.
+    /// Returns the leaf's line with all vertices moved by an affine transform.
     #[inline(always)]
     pub fn placed(&self, rows: &Rows) -> [u8; LINE_BYTES] {
         let coordinates = [self.coordinates(0), self.coordinates(1), self.coordinates(2)];

@@ -22,8 +22,8 @@ pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
 const UNITS: usize = 22;
 /// Minimum distance between a face of a stored box and the contents of the box, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
-/// Minimum biased exponent of a unit, which is then 2^-95 m. It is far above the subnormal numbers, so that
-/// products with a unit are exact.
+/// Minimum biased exponent of a unit; this unit is 2^-95 m. All units are therefore far above the subnormal
+/// numbers, and products with them are exact.
 const MIN_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 

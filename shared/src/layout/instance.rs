@@ -3,8 +3,8 @@
 use super::{BvhLeaf, Rows, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Instance of a group, one line among the [`BvhLeaf`]s: a leaf without triangles. The nodes and leaves of
-/// the group's hierarchy are in the group's space, and contain no instances.
+/// Instance of a group of triangles. It takes one line among the [`BvhLeaf`]s: a leaf without triangles. The
+/// nodes and leaves of the group's hierarchy are in the group's space, and contain no instances.
 ///
 /// | bytes | contents |
 /// |---|---|

@@ -1,5 +1,5 @@
-//! Density estimation kernels of caustic photons. The area of a photon's kernel has a 5-bit code. The code
-//! takes the bits that hold the disc fraction in a photon of the photon map.
+//! Density estimation kernels of caustic photons. The area of a photon's kernel is stored as a 5-bit code, in
+//! the bits that hold the disc fraction in photons of the photon map.
 
 use super::photon::DISC_CODES;
 

@@ -7,7 +7,7 @@ use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, writ
 /// normal map, multiplies the glTF factor that it is named after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// F0 of the dielectric before the factor `specularFactor`: `((ior - 1) / (ior + 1))^2` times
+    /// F0 of the dielectric, not yet multiplied by `specularFactor`: `((ior - 1) / (ior + 1))^2` times
     /// `specularColorFactor`. It may exceed 1.
     pub specular: [f32; 3],
     /// Scale of x and y of the normal map (glTF `normalTexture.scale`).

@@ -1,4 +1,4 @@
-//! Nodes of the light tree, one line each. A node stores bounds and power of its up to four children.
+//! Nodes of the light tree, one line each. A node stores the bounds and power of up to four children.
 
 use super::attributes::{decode_octahedral, encode_octahedral};
 use super::{read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};

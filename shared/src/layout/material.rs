@@ -37,8 +37,8 @@ const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | B
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
-/// Position in the flags word of the lowest bit of the [`super::Layers`] index plus 1; 0 stands for no
-/// layers.
+/// Position, in the flags word, of the lowest bit of the layers field. The field holds the index of the
+/// [`super::Layers`] plus 1; 0 stands for no layers.
 const LAYERS_SHIFT: u32 = 9;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
@@ -102,8 +102,8 @@ pub enum Reflectance {
         /// Absorption coefficient inside the solid, 1/m. For a [`PANE`] it is the optical depth, the
         /// coefficient times the thickness.
         absorption: [f32; 3],
-        /// Fraction, 0 to 1, that is transmitted of the light left after Fresnel reflection. A Lambertian
-        /// base with the base colour reflects the rest.
+        /// Fraction transmitted, 0 to 1, of the light left after Fresnel reflection. A Lambertian base with
+        /// the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.
         ior: f32,

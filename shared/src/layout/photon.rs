@@ -24,10 +24,10 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// In the caustic map the five bits of the disc fraction hold the area of the photon's kernel, as a code of
 /// [`super::kernel_share`].
 ///
-/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it.
-/// Importance sampling leaves it out, because it needs the directions of indirect light. In the caustic map
-/// the flag marks light of an emissive surface or of the environment, which gather rays of a narrow lobe can
-/// hit as well.
+/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes direct
+/// photons. Importance sampling ignores them, because it needs the directions of indirect light. In the
+/// caustic map the flag marks light of an emissive surface or of the environment, which gather rays of a
+/// narrow lobe can hit as well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position, metres.
@@ -48,7 +48,7 @@ pub struct Photon {
 
 /// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// Code of the disc fraction 1 of a photon from which no wall hides a part of the disc.
+/// Code of the disc fraction 1, for a photon from which no wall hides any part of the disc.
 pub const FULL_DISC: u8 = 13;
 /// First code of the disc fractions that are relative to a visible region, the unhidden part of the disc.
 const FIRST_REGION: u8 = 20;
@@ -67,9 +67,9 @@ const SMALL_STEP: f64 = 1.4;
 const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Returns the disc fractions of all codes: series from 0.038 to 4 relative to the disc, and from 0.31 to 4
-/// relative to a visible region. Both are piecewise geometric, so that the relative rounding error hardly
-/// varies.
+/// Returns the disc fractions of all codes: one series from 0.038 to 4 relative to the disc, and one from
+/// 0.31 to 4 relative to a visible region. Both are piecewise geometric, so that the relative rounding error
+/// hardly varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];

@@ -8,8 +8,8 @@ pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
 /// Grid of the photons' positions. Grid coordinates `q`, each below 2^20, stand for the position `(origin +
-/// q) * cell`, which is exact in `f32`. The longest side of the covered box spans at least half of the 2^20
-/// cells. Far from the origin it spans fewer, because `f32` is coarser there.
+/// q) * cell`, which is exact in `f32`. The longest side of the box that the grid covers spans at least half
+/// of the 2^20 cells, but fewer far from the origin, where `f32` is coarser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner of the grid, in cells.

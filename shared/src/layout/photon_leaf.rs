@@ -1,8 +1,8 @@
 //! Leaves of the photon map: neighbouring photons in one 128-byte line.
 //!
-//! A leaf stores photons as exactly as [`super::Photon`] does: all positions lie on the
-//! [`super::PhotonGrid`]. A leaf stores each coordinate as a 16-bit offset from the leaf's corner. The
-//! offsets on one axis are contiguous, so that one vector instruction reads all of them.
+//! A leaf stores photons without loss of precision, because all positions lie on the [`super::PhotonGrid`].
+//! Each coordinate is stored as a 16-bit offset from the leaf's corner. The offsets on one axis are
+//! contiguous, so that one vector instruction reads all of them.
 
 use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
@@ -17,9 +17,9 @@ use crate::address::LINE_BYTES;
 /// | 8.. | for each varying axis, the photons' offsets from the corner, two bytes each |
 /// | ..128 | contents of the photons, 8 bytes each, in reverse: the first photon's at the end of the line |
 ///
-/// An axis varies if the photons' coordinates on it differ; at least one axis is marked as varying. The
-/// corner's coordinate takes 20 bits. On a varying axis it is a multiple of 8, and its upper 17 bits are
-/// stored. A photon's content is the last 8 bytes of [`super::Photon`], without the splitting axis.
+/// An axis varies if the photons' coordinates on it differ; at least one axis is marked as varying. A corner
+/// coordinate takes 20 bits. On a varying axis it is a multiple of 8, and only its upper 17 bits are stored.
+/// A photon's content is the last 8 bytes of [`super::Photon`], without the splitting axis.
 #[derive(Clone, Copy)]
 pub struct PhotonLeaf<'a> {
     line: &'a [u8; LINE_BYTES],
@@ -121,8 +121,8 @@ impl<'a> PhotonLeaf<'a> {
         [x.coordinate(index), y.coordinate(index), z.coordinate(index)]
     }
 
-    /// Returns the photons' contents (power, direction and flags) in reverse order: the last element is that
-    /// of photon 0. Elements before the content of the last photon hold other bytes of the line.
+    /// Returns the photons' contents (power, direction and flags) in reverse order: the last element is the
+    /// content of photon 0. Elements before the content of the last photon hold other bytes of the line.
     #[inline(always)]
     pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
         const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];
@@ -135,8 +135,8 @@ impl<'a> PhotonLeaf<'a> {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Returns for each axis whether a leaf stores offsets on it, if its photons have the bounding box
-    /// `bounds`. These are the axes on which coordinates differ, or x if there is none.
+    /// Returns, for each axis, whether a leaf of photons with the bounding box `bounds` stores offsets on
+    /// that axis. It does so on the axes on which coordinates differ, or on x if there is no such axis.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];

@@ -17,16 +17,16 @@ use crate::address::LINE_BYTES;
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
 /// | 22..24 | photon map: upper 16 bits of [`Self::photon_share`] |
 /// | 22..24 | caustic map: one bit per child, set if the normals of all its photons are of one class |
-/// | 24..32 | caustic map: four bits per child, this class of directions ([`normal_class`](super::normal_class)) |
+/// | 24..32 | caustic map: four bits per child, class of its normals ([`normal_class`](super::normal_class)) |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
 /// Offset of the photon share in a node, bytes.
 const SHARE: usize = 22;
-/// Offset, bytes, in a node of a caustic map: bit mask of the children whose normals are of one class.
+/// Offset, bytes, of the bit mask of children of one normal class in a node of a caustic map.
 const OF_ONE_CLASS: usize = 22;
-/// Offset, bytes, in a node of a caustic map: normal classes of the children.
+/// Offset, bytes, of the children's normal classes in a node of a caustic map.
 const CLASSES: usize = 24;
 /// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
@@ -55,9 +55,10 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Returns `r^2 / k`, m^2. A search for the k nearest photons reduces its radius to `r` at the first node
-    /// with leaves that it visits. The host chooses `r` such that most of these searches find k photons. The
-    /// value is 0 in a node without leaves, and where the host has no estimate.
+    /// Returns `r^2 / k`, m^2, for a radius `r` that the host has estimated for this node. A search for the k
+    /// nearest photons reduces its radius to `r` at the first node with leaves that it visits. Most of these
+    /// searches find k photons within `r`. The value is 0 in a node without leaves, and where the host has no
+    /// estimate.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
@@ -70,8 +71,9 @@ impl<'a> PhotonNode<'a> {
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Returns a bit mask of children of a node of a caustic map: those whose normals are all of one class
-    /// ([`normal_class`](super::normal_class)), if this class is not in the bit mask `classes`.
+    /// Returns a bit mask of children, for a node of a caustic map. A child is in the mask if all its normals
+    /// are of one class ([`normal_class`](super::normal_class)) and this class is not in the bit mask
+    /// `classes`.
     #[inline(always)]
     pub fn children_without(&self, classes: u16) -> u16 {
         let node = WideNode(self.0);
@@ -86,8 +88,8 @@ impl<'a> PhotonNode<'a> {
     }
 
     /// Stores, in a node of a caustic map, the class ([`normal_class`](super::normal_class)) of each child
-    /// whose normals have one class in common. `children` yields one bit mask of classes per child. A child
-    /// of several classes has none stored, and [`Self::children_without`] never returns it.
+    /// whose normals are all of one class. `children` yields one bit mask of classes per child. For a child
+    /// of several classes no class is stored, and [`Self::children_without`] never returns it.
     pub fn set_classes(line: &mut [u8; LINE_BYTES], children: impl IntoIterator<Item = u16>) {
         let (mut of_one, mut codes) = (0_u16, 0_u64);
         for (child, classes) in children.into_iter().enumerate().take(NODE_CHILDREN) {

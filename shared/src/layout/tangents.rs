@@ -23,7 +23,6 @@ pub struct Tangents {
 }
 
 impl Tangents {
-    /// Bytes of one triangle's tangents.
     const BYTES: usize = 16;
 
     /// Number of triangles whose tangents one record holds. A record has the size of [`Attributes`].

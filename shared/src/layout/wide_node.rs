@@ -1,6 +1,6 @@
 //! Common format of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node with up to sixteen children.
-//! Children that are leaves come before children that are inner nodes. The indices of each kind are
-//! consecutive.
+//! Children that are leaves come before children that are inner nodes. The leaves have consecutive indices,
+//! and so have the inner nodes.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;

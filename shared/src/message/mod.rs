@@ -119,8 +119,8 @@ pub struct FrameParameters {
     pub queue: u32,
     /// Source of the reflected radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Parameters of gathers in the caustic map; `None` if the map is not used. A gather ray that reaches an
-    /// emitter through specular surfaces then counts the emitter's emission.
+    /// Parameters of gathers in the caustic map; `None` if the map is not used. Without the map, a gather ray
+    /// that reaches an emitter through specular surfaces counts the emitter's emission.
     pub caustics: Option<CausticGather>,
     /// True if the card sends [`LayerSums`] with each pixel. The radiance of a pixel is the same with and
     /// without layers. With layers, a tile has fewer pixels ([`Budget::pixels_of_tile`]).

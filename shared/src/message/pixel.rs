@@ -28,7 +28,8 @@ pub struct SampleCount {
 }
 
 impl SampleCount {
-    /// Counts the probes among `samples` samples from number `first` on. There are none unless `is_adaptive`.
+    /// Returns the count of `samples` samples from number `first` on. A pixel's first [`PROBES`] samples are
+    /// probes if `is_adaptive`.
     pub fn of_range(first: u32, samples: u32, is_adaptive: bool) -> Self {
         let probes = PROBES.saturating_sub(first).min(samples);
         Self { samples, probes: if is_adaptive { probes } else { 0 } }

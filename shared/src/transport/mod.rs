@@ -14,9 +14,9 @@
 //!   message is lost if it has not arrived but a message sent after it has. Only lost messages are repeated.
 //! - The loss of the last messages is detected after some silence. The host, which has a clock, then sends a
 //!   [`FrameKind::Probe`] with the number of this transmission. The card's [`FrameKind::Answer`] returns that
-//!   number: host messages sent before the probe that have not arrived are lost. The answer also carries the
-//!   number of messages that the card has sent. If some have not arrived, they are lost, and the host's next
-//!   probe reports it.
+//!   number. Host messages sent before the probe are lost unless the answer acknowledges their arrival. The
+//!   answer also carries the number of messages that the card has sent. If some of these have not arrived,
+//!   they are lost, and the host's next probe reports the loss.
 
 mod session;
 

@@ -24,7 +24,7 @@ pub struct LineStatistics {
     pub probes: u64,
 }
 
-/// Event that a received frame causes, for the caller.
+/// Event that a received frame reports to the caller of the transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The frame is complete and belongs to this session.
@@ -57,7 +57,7 @@ struct Incoming {
     has_come: bool,
 }
 
-/// Frame without a message that is to be sent next.
+/// Next frame to be sent that carries no message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
     Acknowledge,
@@ -88,8 +88,8 @@ pub(super) struct LinkSession {
     next: u16,
     /// Number of transmissions so far: frames with messages, and probes.
     transmissions: u16,
-    /// Number of messages that the other end had sent before its last answer, if some of them have not
-    /// arrived here. These are lost, and the next probe reports it.
+    /// Number of messages that the other end had sent before its last answer; `None` if none of them is
+    /// missing here. The next probe reports the missing ones as lost.
     lost_below: Option<u16>,
     /// Payload of the other end's last probe. The answer returns it.
     asked: [u8; 2],
@@ -264,7 +264,8 @@ impl LinkSession {
         FrameHeader { kind, session, sequence, acknowledged: self.expected, held }
     }
 
-    /// Returns whether message `number`, within the window from the expected one, has arrived.
+    /// Returns whether message `number` has arrived. It must lie in the window that begins at the expected
+    /// message.
     fn has_come(&self, number: u16) -> bool {
         self.incoming.get(number as usize % WINDOW).is_some_and(|incoming| incoming.has_come)
     }

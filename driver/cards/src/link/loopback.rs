@@ -77,9 +77,9 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 }
 
 impl LoopbackPort {
-    /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, the oldest unreported write is
-    /// 500 µs old, or this port waits for bytes itself. Only calls to this port wake the reader, so the
-    /// port's owner must keep calling it while it has work, and before it waits.
+    /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, a write has waited for 500 µs, or
+    /// this port waits for bytes itself. Only calls to this port wake the reader, so the port's owner must
+    /// keep calling it while it has work, and before it waits.
     #[must_use]
     pub fn patient(mut self, wakes_at: usize) -> Self {
         self.wakes_at = wakes_at.min(self.capacity);

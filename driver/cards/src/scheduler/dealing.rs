@@ -12,16 +12,16 @@ use crate::session::Assignment;
 
 /// Time after which an idle card duplicates another card's tile, as a multiple of the mean time of a tile.
 const HELP_AFTER: u32 = 2;
-/// Time after which an idle card duplicates another card's tile before any tile is done.
+/// Time, while no tile is done yet, after which an idle card duplicates another card's tile.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// Factor in the number of waiting tiles above which a card takes another tile: a card with n tiles and m
-/// other living cards takes one while more than `PLENTY * n * m` tiles wait.
+/// Factor of the number of waiting tiles above which a card takes another tile. A card with n tiles takes one
+/// while more than `PLENTY * n * m` tiles wait, where m is the number of other living cards.
 const PLENTY: usize = 4;
-/// Number of tiles awaiting comparison among which a card seeks one to verify before it takes a waiting tile.
+/// Number of tiles awaiting comparison that are searched for one that a card can verify.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
-    /// Assigns the next tile to a card with a free credit; `None` if no tile is available for the card.
+    /// Assigns the next tile to a card that accepts one more; `None` if no tile is available for the card.
     pub fn take(&mut self, card: CardNumber, now: Duration) -> Option<Assignment> {
         if self.cards[card].standing != Standing::Living {
             return None;
@@ -49,16 +49,16 @@ impl Scheduler {
         !self.entries[index].crashes.is_empty()
     }
 
-    /// Returns whether a card may take another tile. A card without tiles may, and a card with tiles may
-    /// while enough tiles wait for the other cards. Without this limit, tiles would wait behind a slow tile,
-    /// and near the end idle cards could not take them.
+    /// Returns whether a card may take another tile. A card without tiles may always take one, a card with
+    /// tiles only while enough tiles wait for the other cards. Without this limit, tiles would wait behind a
+    /// slow tile, and near the end idle cards could not take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
         self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
     }
 
     /// Takes the next tile that is on no card: one reserved for this card, else one from the common queue.
-    /// Only an idle card receives a suspect tile.
+    /// Only an idle card receives a suspect tile, at which cards have crashed.
     fn next_waiting(&mut self, card: CardNumber, is_idle: bool) -> Option<usize> {
         if let Some(own) = self.cards[card].at_home.pop_front() {
             return Some(own);
@@ -87,8 +87,8 @@ impl Scheduler {
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
     }
 
-    /// Takes a tile that was set apart because cards crashed at it, once all other tiles are done. No living
-    /// card may have crashed at the tile less often than `card`.
+    /// Takes a tile that was set apart because cards crashed at it. Such a tile is available once all other
+    /// tiles are done, to the living cards with the fewest crashes at it.
     fn next_set_apart(&mut self, card: CardNumber) -> Option<usize> {
         if self.set_apart.is_empty() || self.open_entries().any(|entry| entry.crashes.len() < CRASHES_APART) {
             return None;
@@ -147,8 +147,8 @@ impl Scheduler {
     }
 }
 
-/// Number of reserved tiles that idle cards leave to a card at work. An idle card would have to gather the
-/// tiles' irradiance records again.
+/// Maximum number of tiles reserved for a working card that idle cards leave to it. An idle card would have
+/// to gather the tiles' irradiance records again.
 const MAX_AT_HOME: usize = 4;
 
 impl Scheduler {
@@ -167,7 +167,7 @@ impl Scheduler {
         self
     }
 
-    /// Finished tiles for which this card's answer alone was accepted.
+    /// Finished tiles that were accepted from this card without an equal answer of another card.
     pub fn rendered_by(&self, card: CardNumber) -> impl Iterator<Item = &Tile> {
         let entries = self.entries.iter().filter(move |entry| entry.progress == Progress::Done(Some(card)));
         entries.map(|entry| &entry.tile)

@@ -16,7 +16,7 @@ impl Scheduler {
     /// Checks that the remaining cards can complete the render.
     ///
     /// # Errors
-    /// If cards disagree with none left to decide, or no card can render the remaining tiles.
+    /// If cards disagree on a tile and none is left to decide, or if no card can render the remaining tiles.
     pub fn check(&mut self, now: Duration) -> Result<(), SchedulerError> {
         if let Some(error) = self.undecidable() {
             return Err(error);

@@ -57,7 +57,8 @@ pub(super) struct Entry {
     pub(super) progress: Progress,
     /// True if two cards must agree on the tile.
     pub(super) is_verified: bool,
-    /// True if the first answer is dazzling, so that another card renders the tile as well.
+    /// True if the first answer is dazzling (implausibly bright), so that another card renders the tile as
+    /// well.
     pub(super) is_doubted: bool,
     /// True if the accepted tile is dazzling, and no other card was available to confirm it.
     pub(super) is_dazzling: bool,
@@ -79,7 +80,7 @@ impl Entry {
         self.progress == Progress::Open
     }
 
-    /// Returns whether a card has a copy of the tile or has answered.
+    /// Returns whether `card` has a copy of the tile or has answered.
     pub(super) fn concerns(&self, card: CardNumber) -> bool {
         self.copies.iter().any(|copy| copy.card == card) || self.has_answer_of(card)
     }
@@ -115,8 +116,8 @@ impl Entry {
         self.is_open() && self.answers.len() > 1
     }
 
-    /// Accepts one of the answers and removes all, if two answers agree or exactly one of two is dazzling.
-    /// Otherwise returns `None`.
+    /// Accepts one of the answers if two agree, or if exactly one of two is dazzling, and removes all
+    /// answers. Otherwise returns `None`.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
         let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
         let answers = std::mem::take(&mut self.answers);

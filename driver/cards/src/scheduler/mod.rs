@@ -1,8 +1,9 @@
 //! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit, which permits one more unanswered tile command, takes
-//! the next tile, unless so few tiles are left that other cards would have none. No card waits for another,
-//! and results arrive in any order. The pixels of a tile depend neither on its card nor on time.
+//! Tiles wait in one queue. A card with a *free credit* may receive one more tile before it has answered all
+//! earlier ones. It takes the next tile, unless so few tiles are left that other cards would have none. No
+//! card waits for another, and results arrive in any order. The pixels of a tile depend neither on its card
+//! nor on time.
 //!
 //! - A second card renders a tile that requires verification, as soon as a card is free. If the two answers
 //!   differ, a third card decides. All tiles of the outvoted card that no other card has confirmed are
@@ -12,9 +13,9 @@
 //!   other one is accepted. If there is only one card, its dazzling tiles are accepted and counted.
 //! - A tile at which cards have crashed (were reset or lost) twice is set apart until all others are done. It
 //!   then goes to the cards with the fewest crashes at it, and is abandoned after five crashes.
-//! - In a render by passes, a tile is reserved for the card that rendered it before and holds its irradiance
-//!   records. Idle cards take reserved tiles of other cards from the end, unless those cards will soon render
-//!   them.
+//! - In a render of several passes, a tile is reserved for the card that rendered it before and holds its
+//!   irradiance records. Idle cards take tiles reserved for other cards, the last ones first, unless those
+//!   cards will soon render them.
 //! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once
 //!   this time exceeds twice the mean time of a tile. The first answer counts.
 //!

@@ -172,8 +172,8 @@ fn two_cards_that_differ_end_the_render() {
     assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
 }
 
-/// The answer of a single card is accepted. Of two different answers, the one that is not dazzling is
-/// accepted. Two equal answers are accepted.
+/// Checks dazzling (implausibly bright) answers. The answer of a single card is accepted. Of two different
+/// answers, the one that is not dazzling is accepted. Two equal answers are accepted.
 #[test]
 fn dazzling_tiles_are_verified_if_there_is_another_card() {
     let dazzling = 1 << 57;

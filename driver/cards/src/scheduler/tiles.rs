@@ -51,8 +51,8 @@ impl GatherOrder {
     }
 }
 
-/// Divides a window into tiles of at most `side * side` pixels, numbered from 0: rows of pixels in the naive
-/// order, otherwise squares.
+/// Divides a window into tiles of at most `side * side` pixels, numbered from 0. The tiles are rows of pixels
+/// in the naive order, otherwise squares.
 pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {
@@ -74,9 +74,10 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// Sorts tiles, numbered from 0, so that any first `k` of them are spread over the picture, and their render
-/// times are typical of it. The key is the fractional part of `number / golden ratio`. The gaps between the
-/// first `k` of `n` numbers have at most three lengths, all about `n / k` (three-gap theorem).
+/// Sorts tiles such that any first `k` of them are spread over the picture, and their render times are
+/// typical of it. The key is the fractional part of `number / golden ratio`. The gaps between the first `k`
+/// of `n` numbers have at most three lengths, all about `n / k` (three-gap theorem). The tiles must be
+/// numbered from 0.
 pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
     /// `2^32` divided by the golden ratio.
     const GOLDEN: u32 = 0x9E37_79B9;

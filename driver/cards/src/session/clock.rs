@@ -12,14 +12,14 @@ const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
 /// Maximum time from the first frame of a card to its hello. A slow serial line takes a second or two.
 const GREETING: Duration = Duration::from_secs(5);
-/// Lower bound of a tile's time limit that is derived from the times of rendered tiles.
+/// Minimum of the time limit for tiles that is computed from the times of rendered tiles.
 const TILE: Duration = Duration::from_secs(30);
 /// Maximum time without progress while no tile is rendered. The longest step is the check of a received
 /// image, which takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
-/// Time per ray that is added to [`STANDSTILL`] while a tile is rendered and no times of tiles are known,
-/// because all pixels may arrive at the end of a tile. It is some fifty times that of the slowest measured
-/// chip.
+/// Time per ray that is added to [`STANDSTILL`] while a tile is rendered and no times of tiles are known. All
+/// pixels of a tile may arrive at its end. The value is some fifty times the time per ray of the slowest
+/// measured chip.
 const RAY: Duration = Duration::from_millis(20);
 
 /// Maximum time between two polls of the link that counts as silence of the card. A longer gap means that the

@@ -141,8 +141,8 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Checks that a card accepts tile commands, and that its budget is that of its first hello, against which
-/// settings, image and tiles were checked.
+/// Checks that a card accepts tile commands, and that its budget equals the one in its first hello. Settings,
+/// image and tiles were checked against the first budget.
 pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
     if budget.tiles == 0 {
         return Err(SessionError::NoTiles);

@@ -179,7 +179,7 @@ impl Session {
         self.events.pop_front()
     }
 
-    /// Returns whether the card has a free credit and the send window has room for a command.
+    /// Returns whether the card accepts another tile and the send window has room for a command.
     pub fn wants_tile(&self) -> bool {
         let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
         self.is_loaded() && self.tiles.len() < credits && self.channel.is_free()
@@ -363,8 +363,8 @@ impl Session {
         result
     }
 
-    /// Returns whether too many bytes arrived without a valid frame: any before the session's first frame, at
-    /// least `MAX_FRAME` after it, because one frame may be truncated.
+    /// Returns whether too many bytes have arrived since the last valid frame: at least `MAX_FRAME`, because
+    /// one frame may be truncated. Before the session's first valid frame one byte is too many.
     fn is_garbled(&self) -> bool {
         let least = if self.clock.has_heard() { MAX_FRAME as u64 } else { 1 };
         self.unheard_bytes >= least

@@ -8,7 +8,8 @@ use photoncard_shared::message::{
 
 /// Relative rounding error of a unit normal.
 const NORMAL_ROUNDING: f64 = 1.0 / (1 << 19) as f64;
-/// Rounding error of a surface's position along the view's axis, relative to the scene's maximum coordinate.
+/// Rounding error of a surface's position along the view's axis, relative to the sum of the maximum
+/// coordinates of the scene and of the eye.
 const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 
 /// Ranges of a frame's pixel sums over n samples, of which s see a surface.
@@ -21,8 +22,9 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// | depths | 0 to s times the distance from the eye to the farthest corner of `[-reach, reach]^3` |
 /// | surfaces s, gathers | 0 to n |
 ///
-/// The maximum magnitude of a coordinate of the scene is `reach` (`Header::reach`), metres. Depths have a
-/// tolerance of 2^-19 of the coordinates, and of one step a sample.
+/// The maximum magnitude of a coordinate of the scene is `reach` (`Header::reach`), metres. The tolerance of
+/// depths is s times the sum of one step and `2^-19 (reach + e)`, where `e` is the maximum magnitude of a
+/// coordinate of the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,

@@ -1,4 +1,4 @@
-//! Replies of the card: the state in which each is valid, and the state that it leads to.
+//! Processes the card's replies: checks that each is valid in the session's state, and changes the state.
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Fault, FaultCode, Reply};

@@ -17,7 +17,7 @@ pub(super) enum Request {
 }
 
 impl Request {
-    /// Event of a reply, and whether the reply is the last one.
+    /// Returns the event of a valid reply, and whether the reply is the last one.
     ///
     /// # Errors
     /// If the reply does not answer the request.

@@ -1,7 +1,6 @@
-//! Card image as it is sent to cards, with checksums that are computed once for all cards, and the progress
-//! of sending it to one card. Only runs of lines that the card lacks are sent. These runs are known if the
-//! card holds this card image or the previous one. Otherwise they follow from the checksums of the chunks in
-//! the card's memory.
+//! Upload of a card image to cards. Checksums are computed once for all cards. Only runs of lines that the
+//! card lacks are sent. These runs are known if the card holds this card image or the previous one. Otherwise
+//! they follow from the checksums of the chunks in the card's memory.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};

@@ -21,8 +21,8 @@ pub struct Hierarchy {
     pub nodes: Vec<[u8; LINE_BYTES]>,
     /// [`BvhLeaf`] records, of up to [`LEAF_TRIANGLES`] triangles each, and [`layout::Instance`] records.
     pub leaves: Vec<[u8; LINE_BYTES]>,
-    /// For each leaf, the indices of its triangles, by slot: of the triangles given to [`build`], then of its
-    /// groups one after the other. Empty for an instance.
+    /// For each leaf, the indices of its triangles, by slot. They count the triangles in world space, then
+    /// those of each group in turn ([`Content`]). Empty for an instance.
     pub leaf_triangles: Vec<LeafTriangles>,
 }
 
@@ -58,8 +58,8 @@ impl<'a> Content<'a> {
     }
 }
 
-/// Triangles with the flags of their materials, from which leaves are encoded. Indices from the number of
-/// triangles on are those of instances, which have lines of their own.
+/// Triangles and the flags of their materials, from which leaves are encoded. Index `triangles.len() + i`
+/// stands for instance `i`, which has a leaf of its own.
 struct Mesh<'a> {
     triangles: &'a [Triangle],
     finishes: Finishes<'a>,
@@ -183,21 +183,21 @@ fn around_instance(instance: &Instance, groups: &[Aabb]) -> Aabb {
 
 type FoldedTree = Folded<LeafTriangles, NodeBox>;
 
-/// Builds and folds the tree of the triangles and instances in boxes.
+/// Builds and folds the tree of the triangles and instances with these bounding boxes.
 fn fold(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
     let parts = Parts::new(boxes);
     let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, boxes)).collect();
     Folded::new(tree(&binary(&around_parts), &parts, boxes, mesh))
 }
 
-/// [`fold`] by median splits.
+/// Builds and folds the tree as [`fold`] does, but by median splits.
 fn fold_halves(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
     let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
     Folded::new(halves(&mut indices, boxes, mesh))
 }
 
-/// Maximum number of stack entries of a traversal of the first tree, which can meet an instance of each
-/// other tree.
+/// Returns the maximum number of stack entries of a traversal. The first tree is the scene's. The others are
+/// those of the groups, which a traversal enters at their instances.
 fn entries(folded: &[FoldedTree]) -> usize {
     let [scene, groups @ ..] = folded else { return 0 };
     // A mark is pushed below the root of a group.

@@ -2,8 +2,9 @@
 //! area becomes least (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy
 //! optimization*).
 //!
-//! The rounds, the order of insertion and the results are those of obvhs. Its search for the best position is
-//! called here for many subtrees in parallel. The tree does not depend on the number of threads.
+//! The rounds, the order of insertion and the results are those of the crate obvhs. Here, the search of obvhs
+//! for the best position runs for many subtrees in parallel. The tree does not depend on the number of
+//! threads.
 
 use obvhs::bvh2::reinsertion::{Reinsertion, find_reinsertion, reinsert_node};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};

@@ -104,8 +104,8 @@ impl Kernel for NearTriangles<'_> {
     }
 }
 
-/// Returns whether triangle `slot` has an area and its box and plane touch the unit ball, and whether a
-/// coordinate exceeds [`MAX_EXTENT`].
+/// Returns two flags for triangle `slot`: whether it has an area and its box and plane touch the unit ball,
+/// and whether a coordinate exceeds [`MAX_EXTENT`].
 #[inline(always)]
 fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, bool) {
     let (mut outside, mut extent) = ([0.0; 3], 0.0);
@@ -136,8 +136,8 @@ pub(super) fn for_each_near(
     for_each_below((scene, memory), (0, None), ball, stack, visit)
 }
 
-/// Does [`for_each_near`] for the tree with this root: of the scene, or of the group of the instance at an
-/// index. `stack` keeps what it has.
+/// Calls `visit` as [`for_each_near`] does, for the tree with the node `root`: the scene's tree, or with an
+/// `instance` that of its group. Entries that are on `stack` already stay there.
 #[inline(always)]
 fn for_each_below(
     (scene, memory): (&SceneImage, Lines),
@@ -200,7 +200,7 @@ fn for_each_below(
     Ok(true)
 }
 
-/// Does [`for_each_near`] for the group of the instance at an index.
+/// Calls `visit` as [`for_each_near`] does, for the triangles of one instance. `index` is that of its leaf.
 #[inline(never)]
 fn for_each_in_group(
     image: (&SceneImage, Lines),

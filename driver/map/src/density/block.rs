@@ -14,14 +14,15 @@ pub(super) struct Block {
     /// Lower and upper corner of the box around the triangles.
     bounds: [Vec3; 2],
     pub(super) triangles: [Option<TriangleId>; LANES],
-    /// Sides of the triangles, before [`Sides::placed`].
+    /// Front and back of each triangle in the space of its group. [`Sides::placed`] converts them to the
+    /// scene.
     pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
     pub(super) are_solid: u32,
 }
 
 impl Block {
-    /// Sets triangle `lane`, after those of all lower lanes.
+    /// Sets the triangle of one lane. The triangles of all lower lanes must be set before.
     pub(super) fn set(&mut self, lane: usize, (triangle, sides): (TriangleId, Sides), corners: &[Vec3; 3]) {
         let [a, b, c] = *corners;
         let own = [a.min(b).min(c), a.max(b).max(c)];
@@ -34,7 +35,7 @@ impl Block {
         self.are_solid |= u32::from(sides.is_solid) << lane;
     }
 
-    /// Sides of a triangle of the block.
+    /// Returns front and back of the triangle in `lane`, with its normals in the scene.
     #[inline(always)]
     pub(super) fn sides_of(&self, lane: usize, triangle: TriangleId) -> Sides {
         self.sides[lane].placed(triangle, self.corners.each_ref().map(|corner| Vec3::from(at(corner, lane))))
@@ -61,8 +62,8 @@ impl Block {
 /// Returns the normals of the three planes through `point` and an edge of triangle `lane`. Also returns six
 /// times the signed volume of the tetrahedron of the point and the triangle.
 ///
-/// The two triangles of a shared edge have exactly opposite normals for it, so that no ray passes between
-/// them.
+/// If two triangles share an edge, their two planes through it have exactly opposite normals. Thus no ray
+/// passes between the triangles.
 #[inline(always)]
 fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
     let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
@@ -77,7 +78,7 @@ pub(super) struct FirstOnWay<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) origin: Vec3,
     pub(super) direction: Vec3,
-    /// Distance up to which all triangles are found, in units of the direction's length.
+    /// Distance within which no triangle is missed, in units of the direction's length.
     pub(super) reach: f32,
 }
 

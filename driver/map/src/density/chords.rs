@@ -85,7 +85,6 @@ impl Chords {
         Self { batches: batches.iter().map(|points| Batch::new(points)).collect() }
     }
 
-    /// Number of chords.
     pub(super) fn number(&self) -> usize {
         self.batches.len() * LANES
     }

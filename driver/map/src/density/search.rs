@@ -13,13 +13,13 @@ use rayon::prelude::*;
 use crate::pack::CardImage;
 use crate::photon::Importons;
 
-/// Ratio of two squared distances: the radius with which a search in a node starts, and the distance of the
-/// k-th neighbour of the photon sampled there.
+/// Squared radius with which a search that begins in a node starts, divided by the squared distance of the
+/// k-th neighbour of the photon sampled in this node.
 const MOST: f32 = 1.4;
 /// Fraction of the sampled photons whose k-th neighbour lies within `GatherDistances::usual`.
 const USUAL_SHARE: f64 = 0.95;
-/// Automatic maximum distance divided by the greatest sampled distance. It exceeds 1 because photons that are
-/// not sampled may have greater distances.
+/// Maximum distance of gathers divided by the greatest sampled distance. It exceeds 1 because photons that
+/// are not sampled may have greater distances.
 const BEYOND_SAMPLES: f32 = 1.5;
 
 /// Search of the photon map, with its buffer.
@@ -103,8 +103,8 @@ impl SampledDistances {
         Ok(Self { neighbors, samples: samples?.into_iter().flatten().collect() })
     }
 
-    /// Writes [`PhotonNode::photon_share`] into each node with a sample, so that gathers start with a small
-    /// radius.
+    /// Writes the squared radius with which a search starts, divided by k, into each node with a sample
+    /// ([`PhotonNode::photon_share`]).
     pub(crate) fn write_shares(&self, image: &mut CardImage) {
         let nodes = image.section_mut(SectionKind::PhotonNodes);
         for sample in self.samples.iter().filter(|sample| sample.distance < UNLIMITED) {

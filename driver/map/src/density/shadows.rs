@@ -102,8 +102,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // For the two triangles of a shared edge these coefficients are equal up to the sign, to the
-                // last bit. Both triangles therefore test the same line.
+                // For the two triangles of a shared edge, these coefficients are exactly equal except for the
+                // sign. Both triangles therefore test the same line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
@@ -125,7 +125,6 @@ impl Shadows {
         }
     }
 
-    /// Computes the planes of the triangles.
     #[inline(always)]
     fn cast_planes(&mut self) {
         let [a, b, c] = &self.corners;

@@ -22,21 +22,22 @@ use crate::pack::CardImage;
 pub(super) struct Sides {
     /// Codes of the normals of front and back; `None` for a side where no photons are stored.
     normals: [Option<u8>; 2],
-    /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its
-    /// front.
+    /// True if the back faces the inside of a solid. False for a double-sided triangle, unless it belongs to
+    /// a closed surface.
     pub(super) is_solid: bool,
     /// True if the triangle's texture cuts out parts of it.
     pub(super) has_cut_outs: bool,
 }
 
 impl Sides {
-    /// The sides of a triangle with these corners, whose sides in its group are `self`.
+    /// Converts front and back of a triangle from the space of its group to the scene. `corners` are its
+    /// corners in the scene, in any unit.
     #[inline(always)]
     pub(super) fn placed(self, triangle: TriangleId, corners: [Vec3; 3]) -> Self {
         if triangle.instance == NO_INSTANCE { self } else { self.turned(corners) }
     }
 
-    /// The sides with the normals of a triangle with these corners.
+    /// Replaces the codes of the normals by those of a triangle with these corners.
     fn turned(mut self, [a, b, c]: [Vec3; 3]) -> Self {
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let codes = [normal, -normal].map(|normal| encode_normal(normal.to_array()));
@@ -53,7 +54,7 @@ impl Sides {
     }
 }
 
-/// Sides of all triangles of a card image, by index.
+/// Front and back of all triangles of a card image, by index.
 pub(super) struct SideTable {
     sides: Vec<Sides>,
     /// True if any triangle has cut-outs.
@@ -68,8 +69,8 @@ struct Finish {
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
-    /// True with partial coverage (glTF `BLEND`). It is no cut-out, because the powers of photons account for
-    /// it.
+    /// True if the material has partial coverage (glTF `BLEND`). Its triangles have no cut-outs, because the
+    /// photons' powers account for the coverage.
     blends: bool,
 }
 
@@ -127,29 +128,30 @@ impl SideTable {
         Ok(table)
     }
 
-    /// Sides of a triangle with these corners, in any unit; for an index out of range, sides without photons.
+    /// Returns front and back of a triangle in the scene. If its index is out of range, neither stores
+    /// photons. `corners` are its corners in the scene, in any unit.
     #[inline(always)]
     pub(super) fn of(&self, triangle: TriangleId, corners: [Vec3; 3]) -> Sides {
         self.stored(triangle).placed(triangle, corners)
     }
 
-    /// Sides of a triangle in the space of its group; for an index out of range, sides without photons.
+    /// Returns front and back of a triangle in the space of its group. If its index is out of range, neither
+    /// stores photons.
     #[inline(always)]
     pub(super) fn stored(&self, triangle: TriangleId) -> Sides {
         self.sides.get(triangle.index as usize).copied().unwrap_or_default()
     }
 
-    /// Returns whether a triangle has cut-outs.
     pub(super) fn is_cut_out(&self, triangle: TriangleId) -> bool {
         self.sides.get(triangle.index as usize).is_some_and(|sides| sides.has_cut_outs)
     }
 
-    /// Marks the double-sided triangles of closed surfaces as solid, because no light enters these. Surfaces
-    /// that emit or transmit light are excluded. A surface is closed if each edge of its triangles is shared
-    /// with one other triangle, which has the edge in the opposite direction. Where meshes touch, more than
-    /// two triangles share an edge. Two of them then bound a solid together if they are neighbours by angle
-    /// around the edge and no other solid lies between them. `leaves` are the leaves of the scene or of one
-    /// group; `first` is the index of the first of them.
+    /// Marks the double-sided triangles of closed surfaces as solid, because no light enters such surfaces.
+    /// Surfaces that emit or transmit light are excluded. A surface is closed if each edge of its triangles
+    /// is shared with one other triangle, which has the edge in the opposite direction. Where meshes touch,
+    /// more than two triangles share an edge. Two of them then bound a solid together if they are neighbours
+    /// by angle around the edge and no other solid lies between them. `leaves` are the leaves of the scene or
+    /// of one group; `first` is the index of the first of them.
     fn find_closed_sheets(&mut self, leaves: &[Line], first: usize, finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -206,7 +208,7 @@ impl SideTable {
     }
 }
 
-/// Indices of the first leaf of the scene and of that of each group, ascending.
+/// Returns the indices of the first leaves of the scene and of each group, ascending.
 fn first_leaves(image: &CardImage) -> Vec<usize> {
     let nodes = image.section(SectionKind::Nodes);
     let instances = image.section(SectionKind::Triangles).iter().filter_map(|line| Instance::read(&line.0));

@@ -97,7 +97,8 @@ pub(super) struct FractionWithin<'a> {
     pub(super) centre: Vec3,
     pub(super) radius: f32,
     /// Distance above or below the photon's plane up to which a point counts as in the plane, in radii of the
-    /// ball around the photon's cluster. The photon grid can move a photon off its surface.
+    /// ball around the photon's cluster. It allows for the photon grid, which can move a photon off its
+    /// surface.
     pub(super) lift: f32,
 }
 

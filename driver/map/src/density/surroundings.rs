@@ -22,10 +22,10 @@ use super::sides::SideTable;
 /// Maximum number of triangles in [`Surroundings`]. With more, tracing each chord through the hierarchy is
 /// faster.
 const MAX_TRIANGLES: usize = 1536;
-/// Number of triangles above which a ball is crowded: few chords suffice.
+/// Number of triangles in a ball above which few chords suffice.
 const CROWD: usize = 512;
-/// Number of listed triangles from which duplicates are omitted. Thousands of coincident triangles then act
-/// as one.
+/// Once the list has this many triangles, it omits further duplicates. Thousands of coincident triangles then
+/// act as one.
 const MAX_WITH_TWINS: usize = 512;
 /// Maximum number of triangles in a ball that `Surroundings::is_plain` tests for coplanarity.
 const MAX_PLAIN: usize = 24;
@@ -65,8 +65,9 @@ impl Surroundings {
         all
     }
 
-    /// Returns whether the triangles in a ball form one plane without holes that passes through its centre,
-    /// has the normal of `wall`, and contains all photons of `wall`. The list of triangles does not change.
+    /// Returns whether the triangles in a ball form one plane without holes. The plane must pass through the
+    /// ball's centre, have the normal of `wall`, and contain all photons of `wall`. The list of triangles
+    /// does not change.
     ///
     /// # Errors
     /// If the card image is malformed.
@@ -147,7 +148,7 @@ impl Surroundings {
     }
 }
 
-/// Assumption that photons lie on one plane, which `Surroundings::is_plain` tests.
+/// Photons that are assumed to lie on one plane. `Surroundings::is_plain` tests the assumption.
 #[derive(Clone, Copy)]
 pub(super) struct PlainWall<'a> {
     /// Code of the wall's normal.

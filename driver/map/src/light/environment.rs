@@ -148,9 +148,9 @@ impl Cells {
         Self { columns, rows, weights, divided }
     }
 
-    /// Thresholds of the rows, then of the cells in each row ([`thresholds`]). If cells are subdivided, four
-    /// items follow: the number of these cells, [`SIDE`], the cells' indices, and the thresholds of their
-    /// parts.
+    /// Cumulative probabilities ([`thresholds`]) of the rows, then of the cells in each row. If cells are
+    /// subdivided, four items follow: the number of these cells, [`SIDE`], the cells' indices, and the
+    /// thresholds of their parts.
     pub(super) fn thresholds(&self) -> Vec<u32> {
         let mut all = of_grid(&self.weights, self.columns);
         if !self.divided.is_empty() {

@@ -58,7 +58,6 @@ struct SceneEmitter {
 }
 
 impl Lights {
-    /// Collects the lights of a scene.
     pub(crate) fn new(scene: &Scene) -> Self {
         let mut emitters = area_emitters(scene);
         let mut of_triangles = Vec::new();
@@ -115,7 +114,6 @@ impl Lights {
         self.tree.nodes.iter().copied()
     }
 
-    /// Records of the distant lights.
     pub(crate) fn distant(&self) -> &[DistantLight] {
         &self.distant
     }
@@ -125,7 +123,8 @@ impl Lights {
         self.environment.as_ref()
     }
 
-    /// Thresholds of the environment's cells; empty without an environment.
+    /// Cumulative probabilities of the environment's cells (`Cells::thresholds`); empty without an
+    /// environment.
     pub(crate) fn cell_thresholds(&self) -> Vec<u32> {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }

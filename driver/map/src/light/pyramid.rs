@@ -57,7 +57,6 @@ impl Level {
 }
 
 impl Pyramid {
-    /// Builds the pyramid of an image.
     pub(super) fn new(image: &Image) -> Self {
         let texel = |index: usize| decode(image.encoding, image.texels[index]);
         let mut levels = vec![Level::new([image.width, image.height], texel)];

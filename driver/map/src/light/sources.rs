@@ -53,7 +53,7 @@ pub(crate) struct Sources {
     pub(crate) power: f64,
     /// Maximum of `p / q` over the sources, watts: p is the power of a source in its strongest channel, and q
     /// is the probability of choosing the source. The unit of photon powers is derived from it. If a fraction
-    /// of the photons is aimed, the other photons are stronger, and so is this maximum.
+    /// of the photons is aimed, the other photons are stronger, and this maximum is greater.
     pub(crate) strongest: f32,
 }
 

@@ -71,7 +71,7 @@ impl Targets {
         Self::around(scene, &is_lit, boxes, AIMED_SHARE)
     }
 
-    /// Targets around the triangles of the chosen materials, and around others.
+    /// Targets around the triangles of the chosen materials and the triangles `others`.
     fn around(
         scene: &Scene,
         is_chosen: &[bool],

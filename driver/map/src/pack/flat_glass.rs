@@ -1,9 +1,9 @@
 //! Flat glass: thin walls, and glass solids that are panes.
 //!
 //! A pane is a slab with parallel faces. Light that passes both faces keeps its direction, so that shadow
-//! rays can pass a pane like a thin wall. The faces have a material record of their own ([`PANE`]). It
-//! applies the transmittance of the whole slab to light that enters. The model ignores the lateral shift of
-//! the light by refraction, and the rim of the slab.
+//! rays can pass a pane like a thin wall. The faces have a material record of their own ([`PANE`]). This
+//! record applies the transmittance of the whole slab to light that enters. The model ignores the lateral
+//! shift of the light by refraction, and the rim of the slab.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ const EQUAL: f32 = 0.99;
 const EVEN: f32 = 0.02;
 /// Rounding error of a coordinate, relative to the greatest coordinate.
 const ROUNDING: f32 = 1e-6;
-/// Number of steps per unit of the thickness's natural logarithm. Panes in one step share a record.
+/// Panes of an absorbing material with equal `round(THICKNESS_STEPS ln(thickness))` share a record.
 const THICKNESS_STEPS: f32 = 100.0;
 
 /// Material record that panes share.
@@ -35,12 +35,12 @@ struct Pane {
     thickness: f32,
 }
 
-/// Triangles with the indices of their materials in the card image: first the scene's materials, then those
-/// of panes.
+/// Triangles whose materials are numbered as in the card image: first the scene's materials, then those of
+/// panes.
 pub(super) struct Glazing<'a> {
     pub(super) triangles: Cow<'a, [Triangle]>,
     panes: Vec<Pane>,
-    /// Index of a pane in `panes`, by material and step of the thickness.
+    /// Index of a pane in `panes`, by material and rounded thickness ([`THICKNESS_STEPS`]).
     known: BTreeMap<(u32, i32), u32>,
 }
 

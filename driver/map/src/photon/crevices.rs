@@ -13,8 +13,8 @@ use super::tracer::Traced;
 const SAMPLED: usize = 32;
 /// Rank of the neighbour, from 1, whose distance measures the density.
 const NEIGHBOR: usize = 8;
-/// Fraction of the sampled photons whose density is at least the density that is used for all. It is below
-/// 1/2 so that a wide ground does not dominate.
+/// Fraction of the sampled photons at which the density is higher than the value used for all photons. It is
+/// below 1/2 so that a wide ground does not dominate.
 const SHARE: f64 = 0.25;
 /// Maximum number of a path's arrivals at one place that contribute power. More arrivals occur only between
 /// sheets that nearly touch, whose light is invisible.
@@ -25,7 +25,7 @@ const MIN_COSINE: f32 = 0.8;
 /// Distance on a surface within which a path keeps only one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spacing {
-    /// Squared distance, grid cells.
+    /// Squared distance, square grid cells.
     squared: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Guiding of emission: warps the unit hypercube from which emission is sampled. The density increases at
-//! points whose paths are useful, because they store photons that the picture uses.
+//! Guiding of emission: warps the unit hypercube from which emission is sampled. Points whose paths store
+//! photons that the picture uses are sampled more densely.
 //!
 //! The hypercube is halved repeatedly, each box along the dimension that best separates useful from useless
 //! paths. A point is transformed by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance
@@ -13,7 +13,7 @@ pub(super) type Point = [u64; DIMENSIONS];
 
 /// Fraction of the points that are uniformly distributed. Its inverse is an upper bound of the weights.
 pub(super) const UNIFORM_SHARE: f64 = 0.25;
-/// Minimum number of useful samples per half, on average.
+/// Minimum mean number of useful samples in the two halves of a box that is split.
 const MIN_USEFUL: usize = 8;
 /// Number of hypothetical samples that are added to a box's own samples. Their mean square use is that of the
 /// enclosing box.
@@ -26,7 +26,7 @@ const ALL: f64 = 18_446_744_073_709_551_616.0;
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
 /// Point of the hypercube from which a path is emitted, and how much the picture uses the path's photons.
-/// Both use values are those of the same path without guiding.
+/// `use_of_path` and `squares` count the powers that the photons would have without guiding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
     pub(super) point: Point,
@@ -63,7 +63,6 @@ struct Region {
     halves: Option<Halves>,
 }
 
-/// Halves of a box.
 #[derive(Clone, Copy, Debug)]
 struct Halves {
     dimension: usize,
@@ -127,7 +126,7 @@ impl Guide {
         self.gain
     }
 
-    /// Root mean square of the use of a guided path times its weight.
+    /// Root mean square, over guided paths, of a path's use times its weight.
     pub(super) fn spread(&self) -> f64 {
         self.spread
     }

@@ -53,8 +53,8 @@ impl Importons {
         Self::of(packed, camera, EYE_PATHS, areas)
     }
 
-    /// Finds the importons of fewer eye paths. The cells of the grids are as small as the number of importons
-    /// allows.
+    /// Finds the importons of a camera with fewer eye paths than [`Self::new`]. The cells of the grids are as
+    /// small as the number of importons allows.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -76,9 +76,9 @@ fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Ve
     Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
 }
 
-/// Estimates the fraction of the power arriving at surfaces, over all bounces, that caustics contribute where
-/// they occur. It is the mean of the fractions in cells of space, weighted by the power of caustics. It is 1
-/// if no other light arrives.
+/// Estimates which fraction of the arriving power, over all bounces, comes from caustics at the places where
+/// they occur. It is the mean of this fraction over cells of space, weighted by the power of caustics. It is
+/// 1 if no other light arrives.
 pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
     let power_by = |sources: Option<&Sources>, purpose: Purpose| {
         // The pilot's paths have another seed, so that the number of paths does not depend on the photons of
@@ -116,8 +116,8 @@ impl CellPowers {
         self.0.values().map(|cell| cell.power).sum()
     }
 
-    /// Mean over cells of the ratio of these powers to all power in the cell, weighted by these powers. It is
-    /// at least the ratio of the two total powers.
+    /// Returns the mean over cells of a cell's power divided by its power in `all`, weighted by the former.
+    /// The result is at least the ratio of the two total powers.
     fn share_of(&self, all: &Self) -> f64 {
         let (own, whole) = (self.power(), all.power());
         // Only pairs of different photons count: pairs of a photon with itself would make any light of few

@@ -80,7 +80,7 @@ impl StoredPhoton {
         Vec3::from(decode_normal(Photon::normal_of_flags(self.flags()))).normalize()
     }
 
-    /// Class of the normal of the photon's surface ([`normal_class`]).
+    /// Class of similar directions, 0 to 15, that contains the photon's surface normal ([`normal_class`]).
     pub(crate) fn normal_class(self) -> u32 {
         normal_class(Photon::normal_of_flags(self.flags()))
     }
@@ -148,8 +148,9 @@ impl Photons {
         Self { list, grid, power_unit }
     }
 
-    /// Replaces the first photons, the fraction `share` of all, by the first photons of `others`. Paths are
-    /// numbered and independent, so that the result is the same as if the first paths were traced anew.
+    /// Returns these photons with the first of them replaced by the first photons of `others`. `share` is the
+    /// fraction to replace. Paths are numbered and independent, so that the result is as if the first paths
+    /// were traced anew.
     #[must_use]
     pub fn with_replaced(&self, others: &Self, share: f64) -> Self {
         let count = ((share * self.len() as f64) as usize).min(self.len()).min(others.len());

@@ -33,8 +33,9 @@ const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
 /// Minimum number of paths for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
-/// Fraction of the arriving power (`caustic_share`) from which caustics get all [`MAX_PATHS_TO_CAUSTICS`]
-/// additional paths. A smaller fraction gets proportionally fewer, but at least [`MIN_PATHS_TO_CAUSTICS`].
+/// Minimum fraction of the arriving power (`caustic_share`) at which caustics get all
+/// [`MAX_PATHS_TO_CAUSTICS`] additional paths. A smaller fraction gets proportionally fewer, but at least
+/// [`MIN_PATHS_TO_CAUSTICS`].
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
 /// Traces paths until `count` photons are stored. It stores none if no surface stores photons, and fewer if

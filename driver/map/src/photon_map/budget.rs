@@ -10,7 +10,7 @@ use super::settings::{PhotonLayout, PhotonSettings};
 use super::store::{CAUSTIC_SECTIONS, PHOTON_SECTIONS};
 use crate::pack::{CardImage, PackError, PackedScene};
 
-/// Approximate number of photons per line, including the lines of inner nodes.
+/// Approximate number of photons divided by the number of lines of leaves and inner nodes.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
 /// Checks whether the card image of a packed scene, with a photon map of these settings, can fit a card's

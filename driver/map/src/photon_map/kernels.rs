@@ -15,8 +15,8 @@ use crate::photon::{Photons, StoredPhoton};
 /// Maximum number of neighbours from which the density is estimated. A radius for more neighbours is
 /// extrapolated from this density.
 const MAX_PROBED: u32 = 64;
-/// Area of a kernel's disc relative to a uniform disc with equal variance. The kernel falls towards its edge
-/// and thus uses fewer photons effectively.
+/// Area of a kernel's disc, divided by the area of a uniform disc that gives equal variance. The kernel falls
+/// towards its edge and thus uses fewer photons effectively.
 const AREA: f32 = 4.0 / 3.0;
 /// Maximum radius of a photon's kernel, as a fraction of the diagonal of the scene. Where light is so sparse
 /// that a larger radius would be needed, single photons show as faint spots of this size.

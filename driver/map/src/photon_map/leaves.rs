@@ -2,14 +2,14 @@
 //! leaf and each inner node is one line of card memory.
 //!
 //! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing
-//! considered harmful*), so that a search rarely visits both sides. It assumes that the probability of a
-//! visit of a box is proportional to the volume of the box enlarged by the search radius. Splits are rounded
-//! to whole leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest
-//! expected visits, by the same probabilities.
+//! considered harmful*), so that a search rarely visits both sides. The heuristic assumes that a search
+//! visits a box with a probability proportional to the volume of the box enlarged by the search radius.
+//! Splits are rounded to whole leaves, so that lines are full. The binary tree is then folded into wide nodes
+//! with the fewest expected visits, by the same probabilities.
 //!
-//! In a caustic map photons are first grouped by the classes of their normals and by the sizes of their
-//! discs, and then split in space. A search thus skips the groups of other surfaces, and no large disc
-//! enlarges the box of small ones.
+//! In a caustic map, photons are first grouped by classes of similar normals and similar disc areas, and then
+//! split in space. A search thus skips the groups of other surfaces, and no large disc enlarges the box of
+//! small ones.
 
 use std::num::NonZeroU8;
 
@@ -30,7 +30,7 @@ const MIN_INTERVALS: usize = 8;
 const SAMPLED: usize = 4096;
 /// Number of photons above which a box is assumed to contain several surfaces.
 const MANY: usize = 64;
-/// Depth of the binary tree from which subtrees are split at the median.
+/// Depth of the binary tree at and below which subtrees are split at the median.
 const MAX_SKEWED: usize = 40;
 /// Maximum coordinate of a grid point.
 const LAST_POINT: u32 = (1 << GRID_BITS) - 1;
@@ -56,8 +56,8 @@ impl<'a> PhotonTree<'a> {
     }
 
     /// Builds the tree of a caustic map, which is searched for the photons whose discs contain a point. A box
-    /// contains all points within the distance `reach` of its photons, and a node states the classes of the
-    /// normals below each child.
+    /// contains all points within the distance `reach` of its photons, and a node stores, for each child, the
+    /// classes of the normals below it.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
         Self::of(photons, &Searches { radius: 0.0, reach: Some(reach) })
     }
@@ -108,8 +108,8 @@ struct Searches<'r> {
     reach: Option<Reach<'r>>,
 }
 
-/// Group of a caustic photon: the class of its normal, and that of its disc. Disc areas in a group differ by
-/// a factor of at most two.
+/// Group of a caustic photon: the class of its normal, and the class of its disc's area. Areas in a class
+/// differ by a factor of at most two.
 fn group(photon: &StoredPhoton) -> (u32, u8) {
     (photon.normal_class(), photon.disc() / 2)
 }
@@ -232,8 +232,8 @@ impl Extent {
     /// Approximate number of photons per leaf in the box.
     fn leaf_photons(&self, photons: usize) -> usize {
         let axes = (0..3).filter(|&axis| self.side(axis) > 0).count();
-        // Photons lie on surfaces: many photons on several, few photons on one, which may be oblique to the
-        // axes.
+        // In a box of many photons, a leaf is assumed to lie in a plane along two axes. Few photons lie on
+        // one surface, which may be oblique to the axes.
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
@@ -363,7 +363,7 @@ mod tests {
         }
     }
 
-    /// Reach of a photon, cells: 1,000 for each step of its disc.
+    /// Reach of a photon, cells: 1,000 times the code of its disc.
     fn reach(photon: &StoredPhoton) -> u32 {
         1000 * u32::from(photon.disc())
     }

@@ -13,8 +13,8 @@ const MIN_DIRECTION_COSINE: f32 = 0.8;
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Number of photons in a leaf of [`Places`].
 pub(super) const LEAF: usize = 12;
-/// Maximum distance between two photons of one leaf, surface and light at which they share the distance `d`
-/// of a neighbour, divided by `d`.
+/// Maximum `r / d` at which a photon takes over the neighbour distance `d` of another photon of its leaf,
+/// surface and light. `r` is the distance between the two photons.
 const SHARED_SHARE: f32 = 0.3;
 
 /// Position of a photon, cells of the photon grid, and the unit vectors by which neighbours are compared.
@@ -104,15 +104,15 @@ impl Places {
         self.places[first].is_like(&self.places[second])
     }
 
-    /// Returns, for each photon, the distance of its nearest neighbour number `number`, counted from 1, on
-    /// its surface and of its light, cells. It is `limit` if there are fewer neighbours within it. A photon
-    /// can reuse the distance of a nearby photon ([`SHARED_SHARE`]).
+    /// Returns, for each photon, the distance to its `number`-th nearest neighbour on its surface and of its
+    /// light, cells. The result is `limit` if there are fewer neighbours within `limit`. A photon can reuse
+    /// the distance of a nearby photon ([`SHARED_SHARE`]).
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
         let leaves = self.places.par_chunks(LEAF).enumerate();
         leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
     }
 
-    /// Does [`Self::distances`] for the photons of a leaf.
+    /// Returns the distances of [`Self::distances`] for the photons of one leaf.
     fn distances_of_leaf(&self, leaf: usize, places: &[Place], number: usize, limit: f32) -> Vec<f32> {
         let mut found: Vec<(&Place, f32)> = Vec::new();
         let mut distances = Vec::with_capacity(places.len());
@@ -130,15 +130,15 @@ impl Places {
         distances
     }
 
-    /// Distance of one photon's nearest neighbour number `number`, counted from 1, on its surface and of its
-    /// light; `limit` if there are fewer neighbours within it.
+    /// Returns the distance from one photon to its `number`-th nearest neighbour on its surface and of its
+    /// light; `limit` if there are fewer neighbours within `limit`.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let nearest = self.nearest(index, number, limit);
         nearest.get(number - 1).map_or(limit, |(squared, _)| squared.sqrt())
     }
 
-    /// Returns the nearest photons of a photon's surface and light, at most `number` and nearer than `limit`:
-    /// squared distances in ascending order, and indices.
+    /// Finds the nearest photons on a photon's surface and of its light: at most `number`, and nearer than
+    /// `limit` cells. Returns their squared distances, ascending, and their indices.
     pub(super) fn nearest(&self, index: usize, number: usize, limit: f32) -> Vec<(f32, usize)> {
         let own = &self.places[index];
         let mut limit = limit * limit;

@@ -127,7 +127,7 @@ impl<'a> Map<'a> {
         Ok(gift)
     }
 
-    /// Returns the other photons of a photon's leaf of [`Places`] that have a similar normal.
+    /// Returns the photons with a similar normal that share a leaf of [`Places`] with a photon.
     fn others_of_leaf(&self, photon: usize) -> Vec<usize> {
         let leaf = photon / LEAF * LEAF;
         let is_other = |&other: &usize| other != photon && self.places.are_alike(photon, other);

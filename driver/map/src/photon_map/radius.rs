@@ -10,7 +10,7 @@ const SAMPLED_PHOTONS: usize = 64;
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
 /// Minimum number of neighbours within the subset if its photons are more than `MIN_STEP` indices apart.
 const MIN_NEIGHBORS: usize = 4;
-/// Distance between the indices of the subset's photons up to which any number of neighbours is enough.
+/// Maximum step between the indices of the subset's photons at which `MIN_NEIGHBORS` does not apply.
 const MIN_STEP: usize = 32;
 
 /// Radius of a typical search for `neighbors` photons, in cells of the photon grid. There is no tree to

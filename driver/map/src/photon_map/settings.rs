@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
-    /// Camera whose picture uses the photons. Paths are then guided towards the surfaces that it uses. `None`
-    /// if photons are for any camera.
+    /// Camera whose picture uses the photons. Paths are then guided towards the surfaces that this picture
+    /// uses. `None` if photons are for any camera.
     pub camera: Option<Camera>,
     /// Number of photons to store.
     pub photons: usize,

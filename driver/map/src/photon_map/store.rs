@@ -68,7 +68,6 @@ pub(super) fn store_irradiance(image: CardImage, points: &PhotonTree) -> Result<
     Ok(image.finish())
 }
 
-/// Appends the nodes and the leaves of a tree.
 fn append_tree(
     image: &mut ImageWriter,
     [nodes, leaves]: [SectionKind; 2],

@@ -58,7 +58,8 @@ pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
 }
 
 /// Returns whether the sizes in a block's counters are at most those that its pixels can have. Counters
-/// beyond the end of the block count as 0: such blocks are not decoded.
+/// beyond the end of the block count as 0: such blocks are not decoded. A block as long as its plain pixels
+/// is not compressed, and always possible.
 fn is_possible(header: &Header, pixels: &[u8]) -> bool {
     let mut counters = [0; COUNTERS];
     for (counter, bytes) in counters.iter_mut().zip(pixels.as_chunks().0) {

@@ -283,7 +283,8 @@ pub enum Shown {
     Denoised,
 }
 
-/// Reads the three channels that `shown` selects (half, float or unsigned) from the first part that has them.
+/// Reads the three channels that `shown` selects, from the first part that has them. Their samples can be
+/// half, float or unsigned integers.
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file

@@ -90,7 +90,7 @@ impl Cost {
         }
     }
 
-    /// Cost of ray caster and gather unit. `reflection` is the FLOPs of all reflection functions per channel.
+    /// Cost of ray caster and gather unit. `reflection` is the FLOPs per channel of all reflection functions.
     fn of_units(workload: &Workload, symbols: &Symbols, reflection: f64) -> Self {
         Self {
             ray_caster: UnitCost {

@@ -65,7 +65,8 @@ pub struct ChipsNeeded {
 /// Upper bound of the speed at which a machine renders frames of a given cost.
 ///
 /// Memory, arithmetic and link are assumed to work simultaneously, as in a pipeline without stalls, and tiles
-/// to be distributed over the chips without loss. If a frame does not use a resource, its rate is infinite.
+/// to be distributed over the chips without loss. The rate of a resource that a frame does not use is
+/// infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Tiles per second that one chip's memory bandwidth allows.
@@ -108,8 +109,8 @@ impl Prediction {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// Resource that limits the frame rate of `chips` chips. Of equal limits, that of the DRAM comes first,
-    /// then that of the arithmetic, then that of the link.
+    /// Resource that limits the frame rate of `chips` chips. If several resources allow the same rate, the
+    /// DRAM is named before the arithmetic, and the arithmetic before the link.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink
@@ -120,8 +121,8 @@ impl Prediction {
         }
     }
 
-    /// Minimum numbers of chips for a frame rate; at least one. A rate counts as reached if it is missed by a
-    /// relative error of at most 1e-9, which is rounding.
+    /// Minimum numbers of chips for a frame rate; at least one. A rate that is lower by a relative difference
+    /// of at most 1e-9 counts as reached, because this is a rounding error.
     pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
         let chips = |tiles_per_second: f64| {
             let ratio = frames_per_second * self.tiles / tiles_per_second;

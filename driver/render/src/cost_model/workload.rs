@@ -69,8 +69,8 @@ impl Workload {
         workload
     }
 
-    /// Workload that does not depend on the number of interpolated pixels: eye rays, shadow rays, photons per
-    /// gather, tiles and transfers over the link.
+    /// Part of the workload that does not depend on the fraction of interpolated pixels: eye rays, shadow
+    /// rays, photons per gather, tiles, and transfers over the link.
     fn of_pixels(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         Self {

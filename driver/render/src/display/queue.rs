@@ -92,7 +92,8 @@ impl SharedQueue {
         result
     }
 
-    /// Waits until `is_ready` returns true, for at most the time `most`. Returns its last result.
+    /// Waits until `is_ready` returns true, for at most the time `most`. Returns the last result of
+    /// `is_ready`.
     pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
         let is_not_ready = |queue: &mut PacketQueue| !is_ready(queue);
         let waited = self.changed.wait_timeout_while(self.lock(), most, is_not_ready);

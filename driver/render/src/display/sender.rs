@@ -22,7 +22,7 @@ const CONNECT_WAIT: Duration = Duration::from_secs(2);
 const WRITE_WAIT: Duration = Duration::from_millis(100);
 /// Maximum number of bytes in the queue: five million RGB pixels.
 const MAX_WAITING: usize = 64 << 20;
-/// Maximum time without progress of sending after the picture is complete. The display is then given up.
+/// Maximum time without progress of sending, after the picture is complete, before the display is given up.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Maximum time to send the remaining packets after the picture is complete.
 const MAX_AT_END: Duration = Duration::from_secs(20);
@@ -95,8 +95,8 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// Ends the display because the server is too slow. The error counts the unsent packets, and `missed`
-    /// more for tiles that were not queued.
+    /// Ends the display because the server is too slow. The error states the number of unsent packets plus
+    /// `missed`, the number of further tiles that were not queued.
     fn give_up(&self, missed: usize) {
         let packets = self.queue.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
@@ -108,7 +108,7 @@ impl Display {
 }
 
 impl TileSink for Display {
-    /// Queues a tile to be shown. If the queue is full, `Viewer::finish` sends the tile.
+    /// Queues a tile to be shown. If the queue is full, `Viewer::finish` sends the tile later.
     fn put(&self, tile: &FinishedTile) {
         if !self.queue.lock().is_open() {
             return;

@@ -28,8 +28,8 @@ const MAX_SRAM: u64 = 16 << 20;
 /// Minimum memory of an emulated card, bytes.
 pub const MIN_DRAM_BYTES: u64 = 1 << 20;
 
-/// Names and ranges of the capacities in a file. The indices of the chip and the searches of the host limit
-/// the ranges. A capacity that the file does not state is that of the reference chip.
+/// Names and ranges of the capacities in a file. A capacity that the file does not state is that of the
+/// reference chip.
 const RANGES: [(&str, RangeInclusive<u64>); 15] = [
     ("sram_bytes", 1..=MAX_SRAM),
     ("dram_bytes", MIN_DRAM_BYTES..=MAX_DRAM_BYTES),
@@ -91,7 +91,7 @@ impl Emulated {
     /// Reads the capacities of a kind of chip from a JSON file.
     ///
     /// # Errors
-    /// If the file cannot be read, or the kind is impossible.
+    /// If the file cannot be read, or a capacity is unknown, out of its range or contradicts others.
     pub fn read(path: &Path) -> Result<Self, ChipError> {
         let mut text = String::new();
         File::open(path)?.take(MAX_BYTES).read_to_string(&mut text)?;
@@ -129,7 +129,8 @@ impl Emulated {
         fields
     }
 
-    /// Checks capacities that depend on each other, as the firmware does for chips whose kind is a Rust type.
+    /// Checks capacities that depend on each other. The firmware has the same checks for chips whose kind is
+    /// a Rust type.
     fn check(&self) -> Result<(), ChipError> {
         let Budget { photon_cache_bytes, scene_cache_bytes, irradiance_records, in_flight, tiles, .. } =
             self.budget;
@@ -171,9 +172,10 @@ impl Emulated {
         TechniqueMemory { reordering, irradiance_cache, importance_sampling }
     }
 
-    /// Sizes in bytes: of the whole firmware's memory with these capacities, and of its parts for reordering,
-    /// irradiance cache and importance sampling. They are extrapolated from probes, because the size of a
-    /// buffer is linear in its number of entries, and that of the chip in its number of tiles in flight.
+    /// Sizes, bytes, with these capacities: of the whole memory of the firmware, and of its parts for
+    /// reordering, irradiance cache and importance sampling. They are extrapolated from probes: the size
+    /// of a buffer is linear in its number of entries, and the size of the chip in its number of tiles in
+    /// flight.
     fn sizes(&self) -> [usize; 4] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
         let [pixels, queue, records, flights] =
@@ -192,8 +194,8 @@ const ALIGNMENT: usize = 8;
 /// Number of entries of each buffer in the smallest `Probe`. Each other probe doubles one buffer.
 const PROBED: usize = 64;
 
-/// Extrapolates sizes linearly to buffers with the numbers of entries `entries`. The given sizes are those of
-/// the smallest probe, then of five probes that each have twice as many entries in one buffer.
+/// Extrapolates sizes linearly to buffers with the numbers of entries `entries`. The second argument has the
+/// sizes of the smallest probe, then of five probes that each have twice as many entries in one buffer.
 fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
     std::array::from_fn(|i| {
         let size = |sizes: &[usize; 4]| sizes[i] as i64;
@@ -203,7 +205,8 @@ fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) ->
     })
 }
 
-/// Sizes of the smallest probe, and of probes with twice as many entries of one buffer.
+/// Sizes of the smallest probe with `FLIGHTS` tiles in flight, and of probes with twice as many entries of
+/// one buffer.
 const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 6] {
     const ONE: usize = PROBED;
     const TWO: usize = 2 * PROBED;
@@ -306,7 +309,7 @@ mod tests {
             drop(Emulated::from_json(&text));
         }
 
-        /// Half of the numbers are near the ends of a range.
+        /// Half of the tested capacities are near the ends of their ranges.
         #[test]
         fn a_chip_that_is_not_refused_fits_and_can_be_built(
             stated in prop::collection::vec((0..RANGES.len(), any::<u64>(), 0..4_u64, any::<bool>()), 0..6),

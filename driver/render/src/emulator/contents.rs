@@ -1,9 +1,9 @@
 //! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
 //!
-//! A chip tests everything in a line that it reads, so that these counts are the exact numbers of steps of
-//! its units. The only exceptions are boxes in nodes of the caustic map: a search skips those whose classes
-//! of normals cannot match, and they are counted all the same. The cost model ([`crate::cost_model`])
-//! multiplies the counts by the operations per step.
+//! A chip tests everything in a line that it reads. The counts of the contents are therefore the numbers of
+//! steps of the chip's units. There is one exception: searches of the caustic map skip boxes whose classes of
+//! normals cannot match, but these boxes are counted. The cost model ([`crate::cost_model`]) multiplies the
+//! counts by the operations per step.
 
 use std::ops::Range;
 
@@ -75,7 +75,7 @@ impl Contents {
         self.tree_photons += other.tree_photons;
     }
 
-    /// Counts the contents of a line that the chip has read, of which it uses the bytes `used`.
+    /// Counts the contents of a line that the chip has read. `used` is the range of bytes that it uses.
     fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], used: &Range<u32>) {
         match structure {
             Structure::Nodes => {

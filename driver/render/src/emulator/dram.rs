@@ -36,12 +36,12 @@ impl SharedImage {
     }
 }
 
-/// DRAM that takes host memory only for written lines, and not while they equal those of the shared image.
+/// DRAM that takes host memory only for written lines, and none as long as these equal the shared image.
 pub(super) struct EmulatedDram<'a> {
     lines: Stored<'a>,
     limit: u32,
     shared: SharedImage,
-    /// Card image that the memory contains while no line is written; empty until it is given.
+    /// Image that the memory contains by reference while no line is written; empty until an image is given.
     held: SharedImage,
 }
 
@@ -80,7 +80,7 @@ impl<'a> EmulatedDram<'a> {
         self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
     }
 
-    /// Turns the held card image into written lines, by reference, if no line was written.
+    /// Treats all lines of the held card image as written, without a copy, if no line was written.
     #[cold]
     fn adopt(&mut self) {
         if let Some(Given { image, .. }) = self.held() {
@@ -114,8 +114,8 @@ impl<'a> EmulatedDram<'a> {
         }
     }
 
-    /// Stores lines by reference if they equal the lines of the shared image at the same addresses, and begin
-    /// at most at the end of the lines written so far. Returns whether the lines are stored.
+    /// Stores lines by reference if they equal the lines of the shared image at the same addresses, and
+    /// `first` is at most the number of lines written so far. Returns whether the lines are stored.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(Given { image, .. }) = self.shared.0.get()

@@ -9,7 +9,7 @@ use photoncard_firmware::kind::{Array, Buffer, Capacity, ChipKind, FixedCapacity
 use photoncard_firmware::photon::{CandidateStorage, Candidates};
 use photoncard_shared::budget::Budget;
 
-/// Kind of chip whose buffers are on the heap, with the sizes given here.
+/// Kind of chip whose buffers are on the heap. The fields state their sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emulated {
     pub(super) budget: Budget,
@@ -133,7 +133,7 @@ impl<T> Buffer<T> for HeapBuffer<T> {
     }
 }
 
-/// Array whose length is set once.
+/// Array on the heap, whose length is set once.
 #[derive(Debug)]
 pub struct HeapArray<T>(Vec<T>);
 

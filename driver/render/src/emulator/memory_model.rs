@@ -217,8 +217,8 @@ impl MemoryTraffic {
         self.contents.add(&other.contents);
     }
 
-    /// Reads of the structures that `chosen` selects, for tiles: requested by the chip, and fetched from
-    /// DRAM.
+    /// Reads, for tiles, of the structures that `chosen` selects. The first element is the reads that the
+    /// chip requested, the second is the reads from DRAM.
     pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> [Reads; 2] {
         [self.requested.of_tiles(&chosen), self.fetched.of_tiles(&chosen)]
     }

@@ -90,8 +90,8 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget: `reference`, `large`, `micro` or `other`. The size of card
-    /// memory does not matter. The chip may also be on a board.
+    /// Name of the kind of chip, emulated or on a board, with this budget: `reference`, `large`, `micro` or
+    /// `other`. The size of card memory does not matter.
     pub fn name_of(budget: &Budget) -> &'static str {
         let is = |kind: &Budget| Budget { dram_bytes: kind.dram_bytes, ..*budget } == *kind;
         let kinds = [(&kind::REFERENCE, "reference"), (&kind::LARGE, "large"), (&kind::MICRO, "micro")];

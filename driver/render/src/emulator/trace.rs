@@ -1,5 +1,5 @@
-//! Trace files of the memory reads of a chip for its tiles: above the caches for a cache simulator, or below
-//! them for a DRAM simulator.
+//! Trace files of a chip's memory reads for its tiles. A trace records the reads above the caches, for a
+//! cache simulator, or below them, for a DRAM simulator.
 //!
 //! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
 //! blank, and a byte address in hexadecimal. Label 0 is a read of data. Label 4 is Dinero's escape that
@@ -128,7 +128,7 @@ impl TraceFile {
         self.fetches += 1;
     }
 
-    /// Begins a tile. A cache simulator empties its caches there.
+    /// Marks the beginning of a tile in the trace. A cache simulator empties its caches there.
     pub(super) fn begin_tile(&mut self) {
         if !self.is_below_caches() {
             self.add(format_args!("{FLUSH} 0"));

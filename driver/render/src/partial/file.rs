@@ -89,7 +89,8 @@ fn open_there(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// Checks that a file is a regular one with a single hard link. With several, it may belong to somebody else.
+/// Checks that a file is a regular file with a single hard link. A file with several may belong to somebody
+/// else.
 fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
     let linked = has_other_names(found).then_some("file with other hard links");
     match kind_of(found.file_type()).or(linked) {

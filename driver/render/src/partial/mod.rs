@@ -65,7 +65,7 @@ struct KeptTiles {
     holds_earlier: bool,
     /// True if the file has tiles of this render or of the earlier one.
     holds_tiles: bool,
-    /// Offset of each record of this render, by tile number.
+    /// Offset in the file of each record that this render wrote, by tile number.
     records: HashMap<u32, u64>,
     failed: Option<PartialError>,
 }
@@ -145,8 +145,8 @@ impl PartialRender {
         is_same.then_some(()).ok_or_else(|| self.written_over("read"))
     }
 
-    /// Checks that the file still has the settings of this render, with the checksum `head`. Tiles appended
-    /// to the file of another picture would be lost.
+    /// Checks that the file still has the settings of this render, with the checksum `head`. If it is the
+    /// file of another picture, tiles appended to it would be lost.
     fn check_own(&self, mut file: &File, head: u32) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let found = read_head(&mut BufReader::new(file), &self.path)?;

@@ -68,9 +68,9 @@ pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -
     is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
-/// Reads all valid tiles from offset `start` on into `kept`, and returns the end of the last one. `file` is
-/// the checksum of the file's head. After invalid bytes the search continues at the next magic number. It
-/// ends when more bytes were read for invalid records than the file's size plus [`MAX_IN_VAIN`].
+/// Reads all valid tiles from offset `start` on into `kept`. Returns the offset of the end of the last one.
+/// `file` is the checksum of the file's head. After invalid bytes the search continues at the next magic
+/// number. It ends when more bytes were read for invalid records than the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(
     reader: &mut BufReader<&File>,
     start: u64,

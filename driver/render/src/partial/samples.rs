@@ -22,12 +22,13 @@ pub(super) struct KeptSamples<'a> {
     most: u32,
 }
 
-/// Samples taken over from a file, divided into those that all pixels have and the remaining ones.
+/// Samples taken over from a file: first samples, which all pixels have, and the remaining samples.
 pub(super) struct Split {
     /// Film of the first samples, which has all pixels. `None` if there are no such samples, or if they are
     /// all samples of the picture.
     pub(super) base: Option<Film>,
-    /// Film of the remaining samples, which may lack pixels; `None` if the file has none of their tiles.
+    /// Film of the remaining samples, which may lack pixels; `None` if the file has no tiles of these
+    /// samples.
     pub(super) rest: Option<Film>,
 }
 

@@ -379,7 +379,7 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
     }
 }
 
-/// A file of another picture that replaces one being written must get no tiles of this picture.
+/// The file of another picture overwrites the file of a running render, which must then append no tiles.
 #[test]
 fn an_overwritten_file_gets_no_more_tiles() {
     let folder = tempfile::tempdir().unwrap();

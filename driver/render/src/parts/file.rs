@@ -68,7 +68,8 @@ impl PartFile {
         Ok(Self { path: path.to_owned(), head, picture, checksum, bytes })
     }
 
-    /// Checks that the length of the file is that of its head plus the records of `patches`, its patches.
+    /// Checks that the file has the length of its head and of the records of `patches`, the patches of the
+    /// part.
     ///
     /// # Errors
     /// If the file has another length.

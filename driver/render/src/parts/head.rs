@@ -40,7 +40,7 @@ impl PartHead {
         Self { part, settings, layers: layers.to_string(), command, units }
     }
 
-    /// Picture that the head describes; `None` if the head does not describe a possible picture.
+    /// Picture that the head describes; `None` if no such picture is possible.
     pub(super) fn picture(&self) -> Option<PartPicture> {
         let numbers = |name: &str| -> Option<Vec<u32>> {
             let numbers = self.settings.get(name)?.as_array()?.iter();

@@ -52,7 +52,7 @@ fn refused(paths: &[PathBuf]) -> PartError {
     }
 }
 
-/// A file with other settings, which is valid by itself, replaces one whose head was read.
+/// After the head of a part was read, a valid part with other settings replaces the file.
 #[test]
 fn a_part_that_changes_after_its_head_was_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! photoncard prepared scene 4\n
-//! { cameras, those of frames, checksums, settings, parameters of the photon map and notes as JSON }\n
+//! { cameras, cameras of frames, checksums, settings, parameters of the photon map and notes as JSON }\n
 //! CRC-32C of all bytes before: u32
 //! zeros up to a multiple of 4096 bytes
 //! lines of the card image, whose CRC-32C is in the JSON

@@ -83,7 +83,8 @@ impl PreparedScene {
         self.frames.keys().copied()
     }
 
-    /// Stand-in for the scene of a frame, with the frame's cameras; `None` if there is no such frame.
+    /// Scene with the cameras of frame `number`, without triangles and other contents; `None` if there is no
+    /// such frame.
     pub fn frame(&self, number: u32) -> Option<Scene> {
         let View { cameras, checksum } = self.frames.get(&number)?;
         let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
@@ -91,7 +92,7 @@ impl PreparedScene {
         Some(Scene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }
 
-    /// Stand-in for the scene: its cameras, without triangles and other contents.
+    /// Scene with the cameras of the prepared scene, without triangles and other contents.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }

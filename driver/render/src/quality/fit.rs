@@ -29,14 +29,15 @@ pub struct Fit {
     pub shadow_rays: u32,
     /// True if irradiance is interpolated between irradiance records.
     pub interpolates: bool,
-    /// Maximum of the error bound of interpolated irradiance; infinite if the quality's own is small enough.
+    /// Upper limit of the error bound of interpolated irradiance; infinite if the bound of the quality
+    /// suffices.
     pub max_irradiance_error: f32,
-    /// Adaptive threshold that the cost model gives for one sample of cost 1: `sqrt(M) / w`,
-    /// W^(1/2)/(sr^(1/2) m). `M` is the median radiance of the lit pixels, and `w` the worth of accuracy: a
+    /// Adaptive threshold of the cost model, `sqrt(M) / w`, W^(1/2)/(sr^(1/2) m), for one sample per pixel
+    /// and paths of cost 1. `M` is the median radiance of the lit pixels, and `w` the worth of accuracy: a
     /// relative variance of 1 in a pixel counts as much as the time of `w^2` samples.
     pub unit_threshold: f64,
-    /// Adaptive threshold at which the pixels of the pilot have 1.1 paths per sample after the probes on
-    /// average, W^(1/2)/(sr^(1/2) m); `None` if the additional paths do not at least halve the variance of
+    /// Adaptive threshold, W^(1/2)/(sr^(1/2) m), at which a sample after the probes has 1.1 paths on average
+    /// in the pixels of the pilot. `None` if the additional paths do not at least halve the variance of
     /// direct light.
     pub spent_threshold: Option<f64>,
     /// Numbers that the scene would need, where they exceed the limits of the quality.
@@ -56,7 +57,7 @@ pub struct Beyond {
     pub photons_in_time: Option<usize>,
 }
 
-/// CPU time limit of a picture, and the properties of the picture that determine how it is spent.
+/// CPU time limit of a picture, and the properties of the picture that determine how the time is divided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeOfPicture {
     /// Time limit times the number of threads, in seconds.
@@ -135,9 +136,9 @@ pub struct Measured {
     pub gather_ray: f64,
     /// Relative root mean square error that a map of a million photons causes in the mean of 4x4 pixels.
     pub million_photons: f64,
-    /// Squared error of a photon map for the camera, divided by that of a map of as many photons for any
-    /// camera. `None` if the camera uses most photons anyway, or the user stated for which cameras photons
-    /// are.
+    /// Squared error of a photon map traced for the camera, divided by the error of a map with as many
+    /// photons traced for any camera. `None` if the camera uses most photons anyway, or the user stated for
+    /// which cameras photons are.
     pub photons_for_camera: Option<f64>,
     /// Number of gather rays cast per pixel, divided by the setting `gather_rays`. It includes the rays of
     /// irradiance records and of samples without interpolation.
@@ -145,8 +146,9 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Standard deviation of a sample with `shadow_rays` shadow rays, divided by that with the greater number
-    /// of the pilot; 1 without noise. Only the noise of positions and shadow rays counts.
+    /// Standard deviation of a sample with `shadow_rays` shadow rays, divided by the standard deviation with
+    /// the greater of the pilot's two numbers; 1 without noise. Only the noise of positions and shadow rays
+    /// counts.
     fn deviation_by(&self, shadow_rays: u32) -> f64 {
         let of_rays = |rays: u32| if rays == 0 { 0.0 } else { self.shadow_ray.powi(2) / f64::from(rays) };
         let variance = |rays: u32| self.place.powi(2) + of_rays(rays);
@@ -163,7 +165,8 @@ const MAX_RATIO_FOR_CAMERA: f64 = 0.6;
 const FEW_LAMBERTIAN: f64 = 0.05;
 /// Range of the number of shadow rays per sample.
 const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
-/// Cost of a shadow ray: its CPU time, divided by that of a sample without shadow rays, in rooms and halls.
+/// Cost of a shadow ray: its CPU time divided by the CPU time of a sample without shadow rays, in rooms and
+/// halls.
 const COST_OF_SHADOW_RAY: f64 = 0.4;
 /// Cost of a gather ray and the photon gather at its end, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_GATHER_RAY: f64 = 1.2;
@@ -171,21 +174,21 @@ const COST_OF_GATHER_RAY: f64 = 1.2;
 const COST_OF_PHOTON: f64 = 2.5;
 /// Minimum and maximum of the adaptive threshold, as multiples of the cost model's threshold.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
-/// Minimum of [`Variances::gather_rays_per_ray`] in costs. The measured value may be too small, because the
-/// surveyed tiles may miss samples that gather.
+/// Minimum of [`Variances::gather_rays_per_ray`] in the computation of costs. The measured value may be too
+/// small, because the surveyed tiles may miss samples that gather.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
-/// Factor of the variance of gather rays if irradiance is interpolated between several records.
+/// Weight of the variance of gather rays if irradiance is interpolated between several records.
 const WEIGHT_OF_RECORDS: f64 = 0.5;
-/// Factor of the squared error of the photon map in 4x4 pixels. It is above 1, because the error appears as a
-/// blotch and not as noise of single pixels.
+/// Weight of the squared error that the photon map causes in the mean of 4x4 pixels, relative to other
+/// variance. It is above 1, because the error appears as a blotch and not as noise of single pixels.
 const WEIGHT_OF_MAP: f64 = 6.0;
-/// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. Most of its photons are then in few places of
-/// the scene, each of which lights a large part of the picture, so that blotches are wide. The pilot's small
-/// map is guided less, and shows only a third of their squared error.
+/// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. It is greater, because most photons of such a
+/// map are in few places of the scene. Each place lights a large part of the picture, so that blotches are
+/// wide. The pilot's small map is guided less, and shows only a third of the blotches' squared error.
 const WEIGHT_OF_GUIDED_MAP: f64 = 8.0 * WEIGHT_OF_MAP;
-/// Minimum number of photons per triangle. The total minimum is at most [`MOST_FOR_TRIANGLES`]. If photons
-/// are farther apart than the furniture is large, a room becomes too dark, a bias that the pilot does not
-/// measure.
+/// Minimum number of photons in the map, per triangle of the scene; in total at most [`MOST_FOR_TRIANGLES`].
+/// If photons are farther apart than the furniture is large, a room becomes too dark. The pilot does not
+/// measure this bias.
 const PHOTONS_OF_TRIANGLE: usize = 8;
 const MOST_FOR_TRIANGLES: usize = 1_000_000;
 /// Maximum error of 4x4 pixels caused by the photon map, divided by the requested noise of the picture. The
@@ -197,8 +200,8 @@ const SHARE_OF_RECORDS: f64 = 0.5;
 /// Error bound of interpolated irradiance, divided by the requested noise of the picture. Where small objects
 /// cover few pixels, the error is then about half of the noise.
 const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
-/// Maximum number of photons for a requested noise. [`MAX_RAYS_OF_RECORD`] is the maximum number of gather
-/// rays per irradiance record.
+/// Maximum number of photons that a requested noise can lead to. [`MAX_RAYS_OF_RECORD`] is the maximum number
+/// of gather rays per irradiance record.
 const MAX_PHOTONS: usize = 16_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 /// Number of photons that a thread traces and stores in a second, as measured in furnished rooms.
@@ -210,7 +213,7 @@ const SECONDS_OF_DENOISER: f64 = 0.25;
 const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
-/// Fraction of a picture's time for its first [`SAMPLES_IN_TIME`] samples and a denoiser.
+/// Maximum fraction of a picture's time that its first [`SAMPLES_IN_TIME`] samples and a denoiser take.
 const SHARE_OF_SAMPLES: f64 = 0.5;
 /// Number of samples per pixel that every time limit should allow. With fewer samples, the time that remains
 /// after the last whole pass would be a large part of the limit.
@@ -228,8 +231,8 @@ const MIN_PHOTONS_IN_TIME: usize = 50_000;
 
 impl Fit {
     /// Adjusts the fit for a picture that is sampled until its noise, relative to its mean, is `noise`.
-    /// Raises photons and gather rays of irradiance records, because more samples do not reduce the errors
-    /// that these cause, and limits the error bound of interpolation.
+    /// Raises the numbers of photons and of gather rays per irradiance record, and limits the error bound of
+    /// interpolation, because more samples do not reduce these errors.
     pub fn for_noise(self, noise: f64) -> Self {
         let Measured { gather_ray, million_photons, .. } = self.measured;
         let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
@@ -289,7 +292,8 @@ impl Fit {
     }
 
     /// Writes the fit into the settings that are not stated. The shadow rays of a pixel and, without an
-    /// irradiance cache, its gather rays are divided among its samples, even if their number is stated.
+    /// irradiance cache, its gather rays are divided among its samples, even if the number of samples is
+    /// stated.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
         let RenderSettings { photons, integrator, .. } = settings;
         if !stated.samples {

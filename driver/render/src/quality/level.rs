@@ -45,10 +45,11 @@ choices!(Quality {
     Paper = "paper": "The dissertation's nominal values, for studies: one sample a pixel, a hundred gather rays, no cache",
 });
 
-/// Number of photons that a gather searches for. Fewer photons blur less and take less time, and with 24 the
-/// noise of gather rays still dominates.
+/// Number of photons that a gather searches for. Fewer photons blur less and take less time. With 24 photons,
+/// the noise of gather rays still exceeds that of photons.
 const NEIGHBORS: u32 = 24;
-/// [`NEIGHBORS`] for a denoised picture, which has fewer gather rays, so that their noise dominates more.
+/// Number of photons that a gather searches for in a denoised picture. Such a picture has fewer gather rays,
+/// and thus more noise of gather rays.
 const NEIGHBORS_OF_DENOISED: u32 = 12;
 
 /// Parameters of a quality whose settings depend on the scene: the worth of accuracy relative to time, and
@@ -70,8 +71,8 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Level for a picture that is denoised. It has half the worth of accuracy, half the samples, an eighth
-    /// of the gather rays of a pixel, and no interpolation.
+    /// Parameters for a picture that is denoised: half the worth of accuracy, half the samples, an eighth of
+    /// the gather rays of a pixel, and no interpolation.
     fn denoised(self) -> Self {
         let share = |range: RangeInclusive<u32>, divisor| range.start() / divisor..=range.end() / divisor;
         Self {
@@ -126,7 +127,7 @@ impl Quality {
         self.settings_for(Finish::Rendered)
     }
 
-    /// [`Self::settings`] for a picture with the finish `finish`.
+    /// Settings like [`Self::settings`], but for a picture with the finish `finish`.
     pub fn settings_for(self, finish: Finish) -> RenderSettings {
         let Some(level) = self.level(finish) else { return RenderSettings::default() };
         let samples = *level.samples.start();

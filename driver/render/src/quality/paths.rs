@@ -3,8 +3,8 @@
 use photoncard_shared::message::MAX_PATHS;
 
 /// Mean number of paths beyond the first, per sample after the probes, that determines the threshold of
-/// adaptive sampling. This value about minimises time times variance in rooms, halls and single objects. With
-/// two to three times as many, the product is 1.2 times as large in halls and Cornell boxes, and a fifth
+/// adaptive sampling. The value nearly minimises time times variance in rooms, halls and single objects. With
+/// two to three times this value, the product is 1.2 times as large in halls and Cornell boxes, and a fifth
 /// smaller in pictures where few pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
 /// Minimum of [`Deviations::gain`] at which adaptive sampling is on. Deviations estimated from two samples
@@ -26,8 +26,8 @@ impl Deviations {
     #[cfg(test)]
     pub(super) const NONE: Self = Self(Vec::new());
 
-    /// Computes the deviation of each pixel from the light of `N` samples, whose variance probes would
-    /// measure, and the mean radiance. A deviation that is not finite becomes 0.
+    /// Computes the deviation of each pixel. `pixels` has the light of `N` samples of each pixel, from which
+    /// the variance is computed, and the pixel's mean radiance. A deviation that is not finite becomes 0.
     pub(super) fn new<const N: usize>(pixels: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
         let of_pixel = |(light, radiance): ([f64; N], f64)| {
             let mean = light.iter().sum::<f64>() / N as f64;
@@ -38,14 +38,14 @@ impl Deviations {
         Self(pixels.into_iter().map(of_pixel).collect())
     }
 
-    /// Mean number of additional paths, beyond the first, per sample after the probes at this threshold.
+    /// Mean number of paths beyond the first, per sample after the probes, at the given threshold.
     fn extra_paths(&self, threshold: f64) -> f64 {
         let extra = |deviation: &f64| paths(*deviation, threshold) - 1.0;
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
     }
 
-    /// Sum of the variances of all pixels with one path per sample, divided by the sum with the paths at this
-    /// threshold; 1 without variance.
+    /// Factor by which adaptive sampling at this threshold reduces the sum of the variances of all pixels,
+    /// compared with one path per sample; 1 without variance.
     fn gain(&self, threshold: f64) -> f64 {
         let by_one: f64 = self.0.iter().map(|deviation| deviation.powi(2)).sum();
         let by_paths: f64 =
@@ -54,8 +54,8 @@ impl Deviations {
         if gain.is_finite() { gain } else { 1.0 }
     }
 
-    /// Threshold of adaptive sampling at which samples after the probes have [`EXTRA_PATHS`] additional paths
-    /// on average; `None` if the gain is below [`MIN_GAIN`].
+    /// Threshold of adaptive sampling at which samples after the probes have on average [`EXTRA_PATHS`] paths
+    /// beyond the first; `None` if the gain is below [`MIN_GAIN`].
     pub(super) fn worthy_threshold(&self) -> Option<f64> {
         let threshold = self.threshold();
         (self.gain(threshold) >= MIN_GAIN).then_some(threshold)
@@ -87,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// Deviations of which one in a hundred has 900 times the variance of the others.
+    /// Deviations of pixels, one in a hundred of which has 900 times the variance of the others.
     fn spots() -> Deviations {
         let light = |pixel| if pixel % 100 == 0 { [1.0, 7.0] } else { [3.9, 4.1] };
         Deviations::new((0..1000).map(|pixel| (light(pixel), 4.0)))

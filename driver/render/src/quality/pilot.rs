@@ -23,8 +23,9 @@ const SPREAD: Grid = Grid { cells: 8, side: 4 };
 /// Grid of tiles in which the gather rays of irradiance records are counted. The tiles are large, because
 /// tiles do not share the records at their borders.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Maximum fraction of an unguided map's photons that the picture uses, at which maps guided to the camera
-/// are tried. In rooms, halls and Cornell boxes, where guiding gains nothing, the fraction is greater.
+/// Maximum fraction of an unguided map's photons that the picture uses, at which the pilot also tries maps
+/// guided to the camera. The fraction is greater in rooms, halls and Cornell boxes, where guiding gains
+/// nothing.
 const MAX_USED_SHARE: f64 = 0.3;
 /// Range of the fraction of an unguided map's photons that the picture uses, in which the short pilot
 /// estimates the error of a guided map instead of measuring it. Below it the picture uses less than a hundred
@@ -34,7 +35,7 @@ const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.1;
 /// unguided map, and `f` the fraction of its photons that the picture uses. `c` is above 1, because guided
 /// photons differ in power.
 const ERROR_BY_USED_SHARE: f64 = 2.0;
-/// Number of photons of the pilot's larger map, divided by that of the smaller map.
+/// Ratio of the numbers of photons of the pilot's larger and smaller map.
 const MORE: usize = 4;
 /// Seeds of the two renders of a pair. They and `PHOTON_SEED` differ from the picture's seed, on which the
 /// chosen settings must not depend.
@@ -69,7 +70,7 @@ impl Effort {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
     /// Variance of a sample caused by its position, at edges and textures in a pixel. It is a lower bound:
-    /// the variance `v / n` that is subtracted for `n` rays is too great if the rays are stratified.
+    /// the variance `v / n` of `n` rays is subtracted, which is too great if the rays are stratified.
     pub(super) place: f64,
     /// Variance of a sample caused by one shadow ray.
     pub(super) shadow_ray: f64,
@@ -98,14 +99,14 @@ pub(super) struct ForCamera {
     /// [`Variances::photon`] of a map for the camera.
     pub(super) photon: f64,
     /// Squared error, including blur, of a map for the camera, divided by that of a map of as many photons
-    /// for any camera. The latter is measured against the map for the camera. If few photons are used, two
-    /// maps for any camera are blurred alike, so that their difference is less than their error.
+    /// for any camera. The error of the map for any camera is measured as its difference from the map for the
+    /// camera. The difference of two maps for any camera would not show the blur that both have.
     pub(super) ratio: f64,
 }
 
 impl ForCamera {
-    /// Computes the errors from two maps for the camera, with fewer and with more photons, and from
-    /// `of_scene`, the map with more photons for any camera.
+    /// Computes the errors from two maps for the camera, `few` with fewer photons and `more` with more, and
+    /// from `of_scene`, a map for any camera with as many photons as `more`.
     fn new(effort: Effort, best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
         let photon = of_photon(effort, best, [&few, &more]);
         let own = photon / (MORE * effort.few_photons) as f64;
@@ -113,8 +114,8 @@ impl ForCamera {
         Self { photon, ratio: own / of_scene }
     }
 
-    /// Estimates the errors from `of_scene`, the [`Variances::photon`] of a map for any camera, and the
-    /// fraction of its photons that the picture uses.
+    /// Estimates the errors of maps for the camera. `of_scene` is [`Variances::photon`] of a map for any
+    /// camera, and `used_share` the fraction of its photons that the picture uses.
     fn estimated(of_scene: f64, used_share: f64) -> Self {
         let photon = ERROR_BY_USED_SHARE * used_share * of_scene;
         Self { photon, ratio: photon / of_scene }
@@ -167,8 +168,8 @@ pub(super) fn measure(
         };
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
-    // Light has the noise of shadow rays and of gather rays. To separate them, only one of the two numbers is
-    // reduced at a time.
+    // Light has the noise of shadow rays and of gather rays. To separate the two, each pair of renders
+    // reduces only one of the numbers of rays.
     let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
     let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
     let best = pair(shadow_rays, gather_rays)?;
@@ -204,16 +205,16 @@ pub(super) fn measure(
     })
 }
 
-/// Variance `v` of a sample caused by one ray. The pairs of renders `noisy` and `best` have the smaller and
-/// the greater number in `rays`. The variance with `n` rays is `a + v / n`, where positions of samples and
-/// other rays cause `a`; two numbers of rays determine `v`.
+/// Variance `v` of a sample caused by one ray. The variance with `n` rays is `a + v / n`, where positions of
+/// samples and other rays cause `a`. `noisy` and `best` are pairs of renders with the smaller and the greater
+/// number of `rays`; their two variances determine `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
     let [more, less] = of_pairs([noisy, best]);
     ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
 }
 
 /// Relative variance of a sample in each pair of renders, over the pixels that see a surface in all renders.
-/// Variances are relative to the squared radiance in the last pair.
+/// It is divided by the squared radiance in the last pair.
 fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
     let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
@@ -245,13 +246,14 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Relative mean squared error of tiles, extrapolated to a map of one photon. It follows from the difference
-/// between two maps with fewer and with more photons, whose errors are independent.
+/// Relative mean squared error of tiles, extrapolated to a map of one photon. It is computed from the
+/// difference between a map with fewer and a map with more photons, whose errors are independent.
 fn of_photon(effort: Effort, best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     difference(best, maps) * effort.few_photons as f64 / (1.0 + 1.0 / MORE as f64)
 }
 
-/// Relative mean squared difference between two maps in the mean indirect light of tiles.
+/// Mean squared difference between the indirect light of two maps, averaged over each tile, relative to the
+/// squared radiance of the tile.
 fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
@@ -307,8 +309,8 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
-    /// Number of gather rays cast per pixel of the tiles, if the setting `gather_rays` is 1 and there is one
-    /// sample a pixel. It includes the rays of irradiance records and of samples without interpolation.
+    /// Number of gather rays cast per pixel of `tiles`, with one sample per pixel and the setting
+    /// `gather_rays` 1. It includes the rays of irradiance records and of samples without interpolation.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =

@@ -1,10 +1,10 @@
 //! Relative mean squared differences between renders, without the pixels that differ most.
 
-/// Fraction of the pixels that is omitted: those with the greatest squared differences. A few bright pixels
-/// would otherwise outweigh all others.
+/// Fraction of the pixels that is omitted: the pixels with the greatest squared differences. Without the
+/// omission, a few bright pixels would outweigh all others.
 const LEFT_OUT: f64 = 0.02;
-/// Radiance of each pixel to which differences are relative. It is at least the median radiance of the lit
-/// pixels, because noise in the dark is less visible.
+/// Radiance by which the difference in each pixel is divided: the radiance of the pixel, but at least the
+/// median of the lit pixels, because noise in the dark is less visible.
 pub(super) struct Levels {
     levels: Vec<f64>,
     median: f64,
@@ -25,7 +25,8 @@ impl Levels {
         self.median
     }
 
-    /// Mean of `((a - b) / level)^2`, without the fraction `LEFT_OUT` of the pixels where it is greatest.
+    /// Mean of `((a - b) / level)^2` over the pixels, without the fraction `LEFT_OUT` with the greatest
+    /// values.
     pub(super) fn mean_square(
         &self,
         a: impl IntoIterator<Item = f64>,

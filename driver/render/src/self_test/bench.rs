@@ -9,7 +9,6 @@ use crate::greeting::GreetingError;
 use crate::open_card::exchange;
 use crate::{CardError, Observer};
 
-/// A card under test.
 pub(super) struct Bench<'a, P> {
     pub(super) session: Session,
     port: &'a mut P,
@@ -30,7 +29,6 @@ impl<'a, P: Port> Bench<'a, P> {
         self.start.elapsed()
     }
 
-    /// Waits for the next event of the session.
     pub(super) fn next_event(&mut self) -> Result<Event, GreetingError> {
         loop {
             if let Some(event) = self.session.next_event() {

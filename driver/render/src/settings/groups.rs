@@ -1,6 +1,6 @@
-//! Groups of settings, each with the options that state its fields. The compiler rejects a new field until
-//! `options` of its group lists it or leaves it out. Defaults are the dissertation's nominal values (Table
-//! 7.1) on one emulated reference chip.
+//! Groups of settings, each with the options that state its fields. The function `options` of a group must
+//! list each field or explicitly omit it; otherwise the code does not compile. Defaults are the
+//! dissertation's nominal values (Table 7.1) on one emulated reference chip.
 
 use photoncard_cards::link::LineFaults;
 use photoncard_cards::scheduler::GatherOrder;
@@ -51,8 +51,8 @@ impl Picture {
         self.crop.unwrap_or(Window::full(self.width, self.height))
     }
 
-    /// Returns whether both position and direction of the camera are stated, so that the view of the scene
-    /// file has no influence.
+    /// Returns whether both position and direction of the camera are stated, so that they replace those in
+    /// the scene file.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
     }
@@ -286,11 +286,10 @@ pub struct CardSet {
     pub faults: Option<LineFaults>,
     /// Fraction of the tiles that two cards render for comparison; `None` for no tiles.
     pub verify: Option<f64>,
-    /// Caches of the memory model. `None` for no model, unless `trace` is stated. Without a model, reads have
-    /// no extra cost.
+    /// Caches of the memory model. `None` for no model, unless `trace` is stated.
     pub caches: Option<CacheSettings>,
-    /// Trace of every read of the chip, for which the set must have a single, emulated card. Without
-    /// `caches`, the caches of its kind of chip are modelled.
+    /// Trace of every read of the chip; `None` for no trace. A trace requires a set of one card, which is
+    /// emulated. Without `caches`, the caches of the card's kind of chip are modelled.
     pub trace: Option<TraceSettings>,
 }
 

@@ -118,9 +118,9 @@ impl RenderSettings {
         if scene.is_specular() { asked } else { 0 }
     }
 
-    /// Canonical form of the settings: it is equal for all settings that give this scene equal pixels. The
-    /// number of caustic photons is that for the scene. Photons are for any camera if no pilot has decided.
-    /// Without a caustic map, the number of its neighbours is the default.
+    /// Canonical form of the settings: it is equal for all settings that give this scene equal pixels. It
+    /// states the number of caustic photons of this scene. Photons are for any camera if no pilot has
+    /// decided. Without a caustic map, the number of neighbours in that map is the default.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         let caustic_photons = self.caustic_photons(scene);

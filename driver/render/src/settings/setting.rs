@@ -1,5 +1,5 @@
-//! Row of the table of options: the field of a setting, the option that states it, its value, and what
-//! depends on it.
+//! Row of the table of options: the field of a setting, the option that states it, its value, and the results
+//! that depend on it.
 
 use photoncard_picture::choice::Choice;
 use serde::Serialize;
@@ -25,9 +25,9 @@ pub struct Setting {
     pub changes: Changes,
     /// Path of the field in [`RenderSettings`](super::RenderSettings), such as `integrator.samples`.
     pub field: &'static str,
-    /// Name of the option, such as `spp`. Provenance has the value by this name.
+    /// Name of the option, such as `spp`. It is also the key of the value in provenance.
     pub option: &'static str,
-    /// Value that provenance records; `None` if no result depends on it, or if another row has it.
+    /// Value that provenance records; `None` if no result depends on it, or if another row records it.
     pub value: Option<Value>,
     /// Argument of the option that states the value; `None` to leave the option out.
     pub argument: Option<String>,
@@ -53,7 +53,7 @@ pub(super) fn value(value: &(impl ToString + Serialize)) -> Stated {
     (Some(json!(value)), Some(value.to_string()))
 }
 
-/// Value and argument of an option that is left out for `None`.
+/// Value and argument of an optional setting. For `None`, the argument is left out.
 pub(super) fn optional(value: Option<impl ToString + Serialize>) -> Stated {
     (Some(json!(value)), value.map(|value| value.to_string()))
 }

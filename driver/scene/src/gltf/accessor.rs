@@ -288,7 +288,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// `count` elements of `size` bytes that start `offset` bytes into a buffer view.
+    /// Returns `count` elements of `size` bytes each that start at byte `offset` of a buffer view.
     fn strided(
         &self,
         view: usize,

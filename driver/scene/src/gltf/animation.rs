@@ -45,7 +45,7 @@ pub struct Animation {
     pub moves_only_cameras: bool,
 }
 
-/// Translation, rotation, scale and weights of a node that animations replace; `None` leaves the node's own
+/// Translation, rotation, scale and weights that animations set for a node; `None` keeps the node's own
 /// value.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NodePose {
@@ -192,8 +192,8 @@ impl<'a> Channel<'a> {
         self.source.document.invalid(&self.item, reason, remedy)
     }
 
-    /// Reads element `element` of a keyframe's output. For weights it is the weight of that morph target;
-    /// other properties have one element. `kind` selects the in-tangent (0), value (1) or out-tangent (2) of
+    /// Reads element `element` of a keyframe's output: the weight of morph target `element`, or element 0,
+    /// the only one, of other properties. `kind` selects the in-tangent (0), value (1) or out-tangent (2) of
     /// a cubic spline; it is 0 for other interpolations.
     fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
         let of_each = self.keyframes.values_of_each();

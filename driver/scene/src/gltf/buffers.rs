@@ -17,8 +17,8 @@ const EXPORT_AGAIN: &str = "export the scene again; the buffer and its descripti
 /// view needs it, because an unused one may be missing or belong to an extension.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
-    /// Bytes of each buffer, at least `byteLength` long; empty for placeholders of compressed views, `None`
-    /// for the BIN chunk.
+    /// Bytes of each buffer that was read, at least `byteLength` long. A placeholder of compressed views has
+    /// no bytes; `None` stands for the BIN chunk.
     bytes: Vec<OnceCell<Option<Bytes<'static>>>>,
     decoded: DecodedViews,
 }

@@ -11,7 +11,7 @@ use crate::error::SceneError;
 use crate::meshopt::{self, Fault, Filter, Layout, Mode};
 
 /// Maximum total size of a file's decoded buffer views, and of its decoded Draco primitives, bytes. The
-/// vertices of the largest scene take less.
+/// vertices of a scene with the maximum number of triangles take less.
 pub(super) const MAX_DECODED: u64 = 1 << 32;
 
 const REMEDY: &str = "compress the file again, or export it without the extension";

@@ -106,7 +106,6 @@ impl Document {
         root.extensions_used.iter().chain(&root.extensions_required).any(|name| name == QUANTIZATION)
     }
 
-    /// Location of `item` in this file.
     pub(super) fn location(&self, item: impl Into<String>) -> Location {
         Location::new(&self.path, item)
     }
@@ -145,8 +144,8 @@ impl Document {
         Err(self.invalid("asset.version", reason, "export the scene as glTF 2.0"))
     }
 
-    /// Checks that the `POSITION` accessor of every primitive exists. The `gltf` crate's validation indexes
-    /// with it unchecked.
+    /// Checks that the `POSITION` accessor of every primitive exists. The `gltf` crate's validation uses the
+    /// accessor's index unchecked.
     fn check_positions(&self) -> Result<(), SceneError> {
         let accessors = self.root.accessors.len();
         for (m, mesh) in self.root.meshes.iter().enumerate() {
@@ -328,7 +327,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     }
 }
 
-/// Parses valid JSON that the types of the `gltf` crate reject. [`schema::amend`] changes the JSON before.
+/// Parses valid JSON that the types of the `gltf` crate reject, after [`schema::amend`] has changed it.
 fn parse_amended(
     path: &Path,
     text: &str,
@@ -374,8 +373,8 @@ fn without_padding(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text).trim_end_matches('\0')
 }
 
-/// Error of invalid JSON with an excerpt of the line, because a line of glTF may contain a whole buffer in
-/// base64.
+/// Creates the error of invalid JSON. It shows an excerpt of the faulty line, because the whole line may
+/// contain a buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
     const CONTEXT: usize = 100;
     let above = error.line().saturating_sub(1);

@@ -52,7 +52,6 @@ struct Counts {
     vertex_bytes: u64,
 }
 
-/// Decoded primitive.
 pub(super) struct Decoded<'s> {
     document: &'s Document,
     item: String,
@@ -164,8 +163,8 @@ impl Counts {
         attributes.saturating_add(self.triangles.saturating_mul(INDICES_BYTES))
     }
 
-    /// Checks that the sums over all decompressed primitives stay within bounds, and that the process can
-    /// have the memory to decompress this one.
+    /// Adds this primitive to the sums over all decompressed primitives. Checks that the sums stay within
+    /// limits, and that the process can have the memory to decompress the primitive.
     fn check_memory(&self, source: &Source<'_>, item: &str) -> Result<(), SceneError> {
         let (document, sums) = (source.document, &source.decompressed);
         let triangles = sums.triangles.get().saturating_add(self.triangles);

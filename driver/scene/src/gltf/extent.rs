@@ -66,8 +66,7 @@ struct Extent<'e, 's, 'a> {
     locals: BTreeMap<usize, Local>,
 }
 
-/// Bounds of the primitives of a mesh that have triangles, in the mesh's space, and the number of their
-/// triangles.
+/// Bounds of a mesh's primitives in the mesh's space, without empty primitives, and the number of triangles.
 #[derive(Clone, Default)]
 struct Local {
     bounds: Vec<Bounds>,

@@ -1,4 +1,4 @@
-//! Bytes of buffers and images, and a cache by which each file in the scene's folder is read once.
+//! Bytes of buffers and images, and a cache that reads each file in the scene's folder only once.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;

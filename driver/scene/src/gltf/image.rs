@@ -50,7 +50,7 @@ enum Found<'a> {
     Converted(&'a Conversion, [Option<File<'a>>; 2]),
 }
 
-/// Texels of an image, `None` if it cannot be read, and the faults of all its files.
+/// Decoded image: its texels, which are `None` if it cannot be read, and the faults of its files.
 struct Decoded {
     size: [u32; 2],
     texels: Option<Vec<[u8; 4]>>,

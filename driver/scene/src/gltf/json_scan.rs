@@ -1,9 +1,9 @@
 //! Scans a JSON text in one pass before it is parsed, without storing values.
 //!
 //! The scan bounds the memory of the parsed text, because two characters may become a material of hundreds of
-//! bytes. Each value counts as twice the largest value of its kind in the types of the `gltf` crate and the
-//! loader, because lists grow by doubling. The scan also finds repeated keys of an object. glTF forbids them,
-//! and parsers differ in which value they take.
+//! bytes. Each value counts as twice the size of the largest type for its kind in the `gltf` crate and the
+//! loader, because lists grow by doubling. The scan also finds repeated keys of an object. glTF forbids
+//! repeated keys, and parsers differ in which value they take.
 //!
 //! A parser skips values that it does not need, whatever they are: numbers beyond the range of floats, lone
 //! surrogates, any depth. The scan skips them too: it only splits the text into tokens, and never fails. Its
@@ -23,7 +23,7 @@ use crate::{Camera, Material};
 /// Maximum number of bytes of memory per byte of JSON, in addition to [`BYTES_OF_ANY`].
 pub(super) const BYTES_OF_A_BYTE: u64 = 32;
 
-/// Memory that the parsed form of any JSON may take, however short, bytes.
+/// Memory that the parsed form of even the shortest JSON may take, bytes.
 pub(super) const BYTES_OF_ANY: u64 = 256 << 20;
 
 /// Estimated memory of a value outside the root's lists, bytes: twice the size of the largest type of a
@@ -86,7 +86,7 @@ pub(super) fn scan(text: &str) -> Option<Scanned> {
 }
 
 /// Index of the quotation mark that ends the string whose text begins at `at`, or the length of the whole
-/// text without one.
+/// text if none does.
 fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {

@@ -14,7 +14,7 @@ use crate::{LightUnits, PunctualKind, PunctualLight, Scene, blender};
 /// Exporters write equal angles for a sharp edge.
 const MIN_PENUMBRA: f32 = 0.001;
 
-/// Angle by which an outer cone may exceed a right angle, as a rounding error, radians.
+/// Maximum excess of an outer cone angle over a right angle that counts as rounding error, radians.
 const ANGLE_TOLERANCE: f32 = 1e-4;
 
 /// Converts the file's punctual lights to the scene's.

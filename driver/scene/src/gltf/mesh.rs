@@ -32,7 +32,8 @@ pub(super) struct MeshPlacer<'a> {
     /// Meshes that are placed as instances of groups, each with the translation of its centre to the origin
     /// of the group's space.
     grouped: BTreeMap<usize, DMat4>,
-    /// Groups of the meshes that are placed, mirrored or not; `None` if no triangle of the group has an area.
+    /// Groups that were added, by the index of their mesh and whether the group is mirrored. The group is
+    /// `None` if all its triangles have zero area.
     groups: BTreeMap<(usize, bool), Option<Group>>,
     /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
@@ -48,12 +49,11 @@ struct Copies {
     others: u64,
 }
 
-/// Group of a mesh.
 #[derive(Clone, Copy)]
 struct Group {
     /// Index in the scene.
     index: u32,
-    /// Lower and upper corner, in the group's space.
+    /// Lower and upper corner of the group's box, in the group's space.
     bounds: [Vec3; 2],
 }
 
@@ -62,14 +62,14 @@ impl Copies {
         self.instances.iter().fold(self.others, |all, count| all.saturating_add(*count))
     }
 
-    /// Number of copies whose triangles need not be stored if there are groups.
+    /// Number of copies whose triangles need not be stored if the copies are instances of groups.
     fn saved(&self) -> u64 {
         self.instances.iter().fold(0, |saved: u64, count| saved.saturating_add(count.saturating_sub(1)))
     }
 }
 
-/// Minimum number of triangles that groups save, for a mesh to be placed as instances of a group. Instances
-/// cost a transform of each ray and leaf.
+/// Minimum number of triangles that groups must save for a mesh to be placed as instances. Instances make
+/// tracing slower, because rays are transformed to the group's space.
 const MIN_SAVED: u64 = 1 << 18;
 
 fn triangles_and_primitives(primitives: &[Primitive<'_>]) -> u64 {
@@ -93,7 +93,7 @@ impl<'a> MeshPlacer<'a> {
     /// Counts `copies` copies of mesh `index`; `worlds` are their world transforms.
     ///
     /// # Errors
-    /// If [`MAX_TRIANGLES`] copies or more are counted, as a scene has at least one triangle besides.
+    /// If [`MAX_TRIANGLES`] copies or more are counted; copies and triangles together may not exceed it.
     pub(super) fn count(
         &mut self,
         index: usize,
@@ -137,8 +137,8 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Checks that all counted meshes together have at most [`MAX_TRIANGLES`] triangles and instances, and
-    /// that a card has room for them.
+    /// Checks that the triangles and instances of all counted meshes are at most [`MAX_TRIANGLES`] together,
+    /// and that they fit into a card's memory.
     pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
         let work = self.placed.iter().fold(0_u64, |work, (mesh, copies)| {
             let of_one = self.prepared.get(mesh).map_or(0, |primitives| triangles_and_primitives(primitives));
@@ -208,8 +208,9 @@ impl<'a> MeshPlacer<'a> {
         primitives.iter().try_for_each(|primitive| self.place_primitive(index, primitive, pose, scene))
     }
 
-    /// Adds an instance of mesh `index`, whose centre `centred` moves to the origin. Returns false if the
-    /// transform has no inverse or the instance is too far from the scene's origin.
+    /// Adds an instance of mesh `index`. `centred` is the translation that moves the mesh's centre to the
+    /// origin. Returns false if the transform has no inverse or the instance is too far from the scene's
+    /// origin.
     fn place_instance(
         &mut self,
         index: usize,

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use bevy_mikktspace::{Geometry, Ops, TangentSpace, generate_tangents};
 use glam::{Vec2, Vec3, Vec4};
 
-/// Maximum number of triangles at a vertex whose tangents are averaged.
+/// Maximum number of triangles that share a vertex at which tangents are averaged.
 const FAN: u32 = 128;
 
 /// Memory that [`tangents`] takes per triangle, including argument and result, bytes.
@@ -26,7 +26,7 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// Key that is equal for corners at one vertex. Negative zeros are replaced by zeros.
+    /// Key that is equal for corners with equal positions, normals and coordinates. -0 equals 0.
     fn vertex(&self) -> [u32; 8] {
         let Self { position: p, normal: n, coordinates: c } = self;
         [p.x, p.y, p.z, n.x, n.y, n.z, c.x, c.y].map(|value| (value + 0.0).to_bits())

@@ -61,8 +61,8 @@ pub use self::settings::LoadSettings;
 use crate::Scene;
 use crate::error::SceneError;
 
-/// Loads the default scene of a glTF file, or its first, with the default settings. The scene must fit the
-/// memory of the reference chip.
+/// Loads the default scene of a glTF file, or its first if the file states no default, with the default
+/// settings. The scene must fit the memory of the reference chip.
 ///
 /// ```
 /// # use std::path::Path;
@@ -83,7 +83,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     load_with(path, &LoadSettings::default())
 }
 
-/// Loads the default scene of a glTF file, or its first.
+/// Loads the default scene of a glTF file, or its first scene if the file states no default.
 ///
 /// [`Scene::notices`](crate::SceneContents::notices) names the features of the file that are not rendered.
 ///

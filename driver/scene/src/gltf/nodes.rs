@@ -61,8 +61,8 @@ pub(super) fn place(
     Ok(())
 }
 
-/// Cameras of the scene's nodes in the poses `poses`. Positions are relative to the scene's origin, or to the
-/// file's without an anchor.
+/// Cameras of the scene's nodes in the poses `poses`. Positions are relative to the scene's origin or,
+/// without `anchor`, to the file's.
 pub(super) fn cameras(
     document: &Document,
     poses: &Poses,
@@ -193,7 +193,7 @@ impl<'a> Placer<'a> {
 }
 
 /// Nodes of the file's default scene, or of its first one, with their world transforms; parents come before
-/// children. The transforms are relative to the scene's origin, or to the file's without an anchor.
+/// children. The transforms are relative to the scene's origin or, without `anchor`, to the file's.
 fn walk(
     document: &Document,
     poses: &Poses,

@@ -165,7 +165,8 @@ impl Notices {
         sentences
     }
 
-    /// Notices that matter only to some pictures, with their subjects, and notices on extensions.
+    /// Notices that matter only to some pictures, with their subjects. The subject of a notice on an
+    /// extension is `None` if the notice matters to every picture.
     fn of_some_pictures(&self, document: &Document) -> Vec<(Option<Concern>, String)> {
         let root = &document.root;
         let Shortened { by_extensions, without_target } = &document.shortened;

@@ -13,15 +13,15 @@ use super::limits::MAX_COORDINATE;
 /// scene's size.
 const NEAR: f64 = 16.0;
 
-/// Distance of a scene's centre from the file's origin beyond which the scene is moved, metres. For a scene
-/// larger than this distance, the limit is the scene's size. Single precision is coarser than 60 um beyond
-/// 1000 m.
+/// Distance of a scene's centre from the file's origin, metres, beyond which the scene is moved although it
+/// is within [`NEAR`]. For a scene larger than this distance, the limit is the scene's size. Single precision
+/// is coarser than 60 um beyond 1000 m.
 const FAR: f64 = 1000.0;
 
 /// Least exponent of a power of two to which the offset is rounded: 2^-10 m.
 const FINEST: i32 = -10;
 
-/// Bounding box in double precision, empty by default.
+/// Bounding box in double precision.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) low: DVec3,
@@ -62,8 +62,8 @@ impl Bounds {
     }
 
     /// Offset of a scene with these bounds, metres. It is 0 along axes on which the scene is near the origin.
-    /// `stated` are translations of top-level nodes. Along each axis, a whole-number translation within one
-    /// scene size of the scene's centre is preferred.
+    /// Along other axes it lies within one scene size of the scene's centre: the first whole number among the
+    /// translations `stated` of top-level nodes, else the number with the fewest digits.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();
@@ -84,8 +84,8 @@ impl Bounds {
     }
 }
 
-/// Returns the number with the fewest digits from `low` to `high`, which have the same sign; of several, the
-/// one nearest to the middle. A decimal digit counts as two binary digits.
+/// Returns the number between `low` and `high`, of equal sign, that has the fewest decimal or binary digits;
+/// of several, the nearest to the middle. A decimal digit counts as two binary digits.
 fn roundest(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;

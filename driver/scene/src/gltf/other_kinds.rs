@@ -59,7 +59,7 @@ enum Kind {
     Picture,
 }
 
-/// Returns the error of a path that names a folder or is an address; `None` for other paths.
+/// Returns the error of a path that is a folder or a URL; `None` for other paths.
 pub(super) fn refused_path(path: &Path) -> Option<SceneError> {
     let text = path.to_string_lossy();
     let is_scheme =

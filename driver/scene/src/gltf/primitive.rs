@@ -220,7 +220,7 @@ impl<'a> Primitive<'a> {
         self.coordinates.iter().any(Option::is_some)
     }
 
-    /// Lower bound of the card memory that each instance takes, bytes.
+    /// Lower bound of the card memory that each stored copy of the primitive takes, bytes.
     ///
     /// # Errors
     /// If the system refuses the memory for the set of vertex positions.
@@ -257,8 +257,8 @@ impl<'a> Primitive<'a> {
         bounds
     }
 
-    /// Positions in the index list of a triangle's corners; vertex numbers if the primitive has no index
-    /// list.
+    /// Positions of a triangle's corners in the primitive's index list. Without an index list, they are the
+    /// indices of the vertices.
     pub(super) fn corners(&self, triangle: u64) -> [u64; 3] {
         self.topology.vertices(triangle)
     }

@@ -1,4 +1,4 @@
-//! Lower bound of the memory that a scene takes on a card. It follows from accessors, instances and image
+//! Lower bound of the memory that a scene takes on a card. It is computed from accessors, instances and image
 //! headers, before geometry is expanded and images are decoded.
 //!
 //! A scene that is rejected here cannot fit a card. Other scenes are measured after they are packed
@@ -16,7 +16,7 @@ use photoncard_shared::layout::{
 use crate::error::SceneError;
 use crate::reduction::reduced_size;
 
-/// Memory of a card, and how much of it the contents counted so far take, bytes.
+/// Memory of a card, bytes: its size, and the part that the contents counted so far take.
 #[derive(Clone)]
 pub(super) struct Room {
     file: PathBuf,
@@ -53,7 +53,7 @@ impl Room {
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
-    /// Adds the card memory of the lines of instances.
+    /// Adds the card memory of `count` instances, one line ([`LINE_BYTES`]) each.
     pub(super) fn instances(&mut self, count: u64) -> Result<(), SceneError> {
         self.take(count.saturating_mul(LINE_BYTES as u64), || {
             format!("{count} instances, images and materials")
@@ -68,7 +68,7 @@ impl Room {
             >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2, true))
     }
 
-    /// Adds the card memory of all `triangles` triangles of a scene with their nodes and attributes: `bytes`.
+    /// Adds `bytes`, the card memory of the scene's `triangles` triangles with their nodes and attributes.
     pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
         self.take(bytes, || format!("{triangles} triangles, images and materials"))
     }

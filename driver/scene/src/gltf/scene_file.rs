@@ -71,7 +71,7 @@ impl SceneFile {
         Ok(Self { document, light_units: *light_units, bare, room, unreadable, framed, anchor })
     }
 
-    /// Evaluates the default scene of the file, or its first, without animations.
+    /// Evaluates the default scene of the file, or its first if it states no default, without animations.
     ///
     /// [`Scene::notices`](crate::SceneContents::notices) names the features of the file that are not
     /// rendered.

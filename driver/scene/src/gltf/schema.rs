@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 /// Exclusive upper bound, 2^53, of the floating-point numbers that represent an integer exactly.
 const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// Values of `path` of an animation target.
+/// Values that glTF allows for the `path` of an animation target.
 const PATHS: [&str; 4] = ["translation", "rotation", "scale", "weights"];
 
 /// Names of the lists in the root object of glTF.

@@ -44,7 +44,7 @@ impl VertexReader<'_, '_> {
         self.primitive.tangents.as_ref().map_or(Vec4::ZERO, |found| found.floats(vertex, [0.0; 4]).into())
     }
 
-    /// Computes tangents along the texture coordinates of a set.
+    /// Computes tangents from a set of texture coordinates by `MikkTSpace`.
     fn computed(&self, set: usize) -> Result<Vec<[Vec4; 3]>, SceneError> {
         let document = self.source.document;
         let count = self.primitive.triangles;

@@ -41,7 +41,7 @@ impl Use {
     }
 }
 
-/// Image in one encoding, with the uses that textures make of it.
+/// Image in one encoding, and each [`Use`] that materials make of it.
 struct Taken {
     origin: Origin,
     encoding: Encoding,

@@ -61,9 +61,9 @@ fn place(corners: [Vec3; 3]) -> ([[u32; 3]; 3], bool) {
     (sorted, !is_descending)
 }
 
-/// Decides which of two coinciding, opposite faces is kept, and with which material. Returns `None` if there
-/// are not two faces of opposite orientation. It also does so for different media if both absorb light, or if
-/// a material has layers or textures.
+/// Decides which of two coinciding, opposite faces is kept, and with which material. Returns `None` unless
+/// there are exactly two faces, of opposite orientation. Different media also give `None` if both absorb
+/// light, or if a material has layers or textures.
 fn touch_of(scene: &Scene, faces: &[usize]) -> Option<(usize, Touch)> {
     let &[one, other] = faces else { return None };
     let triangles = [one, other].map(|face| &scene.triangles[face]);

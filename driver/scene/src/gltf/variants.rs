@@ -6,7 +6,6 @@ use super::document::Document;
 use super::names::listed;
 use crate::error::SceneError;
 
-/// Names of the document's variants.
 pub(super) fn names(document: &Document) -> Vec<String> {
     let stated =
         document.root.extensions.as_ref().and_then(|extensions| extensions.khr_materials_variants.as_ref());

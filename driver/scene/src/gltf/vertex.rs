@@ -16,7 +16,7 @@ use super::transform::Transform;
 use crate::error::SceneError;
 use crate::{Triangle, VertexAttributes};
 
-/// Maximum magnitude of a texture coordinate. There, `f32` steps are 1/16 of the image.
+/// Maximum magnitude of a texture coordinate. At this magnitude, steps of `f32` are 1/16 of the image.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
 /// Maximum distance between a unit vertex normal and the triangle's unit normal at which they count as equal:

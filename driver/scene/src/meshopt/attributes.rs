@@ -16,8 +16,8 @@ const HEADERS: [u8; 2] = [0xa0, 0xa1];
 /// Minimum size of the tail of a stream (first baseline and channel modes) in versions 0 and 1, bytes.
 const TAILS: [usize; 2] = [32, 24];
 
-/// Bit width of a group's differences by the group's two-bit code: in version 0, and in lane modes 0 and 1 of
-/// version 1.
+/// Bit widths of a group's differences, indexed by the group's two-bit code. The rows are for version 0, and
+/// for lane modes 0 and 1 of version 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
 /// Lane mode of version 1 whose differences are all zero.
@@ -99,8 +99,8 @@ fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// Adds the differences at `index` of each lane to `last`, which changes from the last element to the next
-/// one. `channels` has one mode for each four bytes of an element; it is empty in version 0.
+/// Adds the difference at `index` of each lane to `last`, the bytes of the previous element. `channels` has
+/// one mode for each four bytes of an element; it is empty in version 0.
 fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mut [u8]) -> Option<()> {
     for (channel, word) in last.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let difference = [0, 1, 2, 3].map(|byte| lanes[(4 * channel + byte) * lane_bytes + index]);

@@ -1,5 +1,4 @@
-//! Filters of decoded attributes. Input for which the extension defines no result gives any number, but no
-//! panic.
+//! Filters of decoded attributes. They never panic: invalid input gives arbitrary numbers.
 
 use serde::Deserialize;
 

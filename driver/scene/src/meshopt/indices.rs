@@ -30,7 +30,7 @@ impl<T: Copy> Recent<T> {
 
 /// State of the decoder of triangles.
 struct Triangles<'a> {
-    /// Rest of the stream: codes of triangles that need a second byte, and differences of indices.
+    /// Rest of the stream: second code bytes of triangles that have one, and differences of indices.
     data: &'a [u8],
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,

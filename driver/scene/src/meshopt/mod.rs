@@ -32,7 +32,7 @@ pub(super) enum Mode {
     Indices,
 }
 
-/// Size of the decoded elements, and the format of their stream.
+/// Count and size of the decoded elements, and the format of their stream.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     pub(super) count: usize,

@@ -1,4 +1,4 @@
-//! Encodes texels of images with 16 bits per channel in four bytes.
+//! Encodes texels of 16 bits per channel in four bytes each.
 
 use crate::texture::{Encoding, shared_exponent};
 

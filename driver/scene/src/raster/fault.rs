@@ -5,7 +5,6 @@ use photoncard_picture::allocation::{self, OutOfMemory};
 /// Error of an image file: reason and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fault {
-    /// Description of the fault.
     pub(crate) reason: String,
     /// Advice on how to mend or replace the image.
     pub(crate) remedy: &'static str,

@@ -92,8 +92,9 @@ impl Kind {
         self == Self::Png && walled(|| Ok(png::is_deep(bytes))) == Ok(true)
     }
 
-    /// Decodes an image to texels in rows from the top. An image that [is deep](Self::is_deep) is stored as
-    /// `deep` states, others with 8 bits per channel. `size` is the result of [`Kind::size`].
+    /// Decodes an image to texels in rows from the top. An image that [is deep](Self::is_deep) is encoded as
+    /// `deep` states. Other images, and all if `deep` is `None`, have 8 bits per channel. `size` is the
+    /// result of [`Kind::size`].
     pub(super) fn decode(
         self,
         bytes: &[u8],

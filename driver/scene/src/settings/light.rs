@@ -107,8 +107,8 @@ impl Environment {
     /// Sets the factor of the texels.
     ///
     /// # Errors
-    /// Reason and remedy, if the values are not one number of 0 or more, or it or a texel would exceed
-    /// [`BRIGHTEST`].
+    /// Reason and remedy, if `values` is not one number of 0 or more, or if it or a multiplied texel would
+    /// exceed [`BRIGHTEST`].
     pub(super) fn set_strength(&mut self, values: &[f32]) -> Result<(), Refusal> {
         let &[strength] = values else {
             return Err(("the strength is one number", "write environment.strength=2 for twice the map"));

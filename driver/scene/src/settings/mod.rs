@@ -85,10 +85,11 @@ impl Scene {
     /// number for all three channels; other values are one number. Textures still multiply the values. The
     /// emissive texture of a material that did not emit was not loaded; a notice says so.
     ///
-    /// Properties of a light are `colour` (only the ratios of its channels count), `intensity` (of the
-    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and a light of intensity 0
-    /// counts as white) and `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light
-    /// with a unique name). The strength of the environment is a factor of its texels.
+    /// Properties of a light are `colour`, `intensity` and `position`. Only the ratios of the colour's
+    /// channels count. The intensity is that of the greatest channel: W/sr, or W/m^2 of a directional light.
+    /// Setting it keeps the colour; a light of intensity 0 counts as white. The position is `x,y,z` in the
+    /// file's coordinates, metres; only a point or spot light with a unique name has one. The strength of the
+    /// environment is a factor of its texels.
     ///
     /// Materials and lights have no property in common, so that a material and a light may have the same
     /// name. A name may itself contain dots. [`Scene::check_light`] checks that the scene still has a light

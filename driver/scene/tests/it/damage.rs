@@ -18,7 +18,7 @@ fn rich() -> (Value, Vec<u8>) {
     (json, triangle_bytes())
 }
 
-/// Replaces the number at index `nth`, modulo their count, in the JSON.
+/// Replaces one number in the JSON: of `n` numbers, the one at index `nth % n`.
 fn replace_number(json: &mut Value, nth: usize, value: &Value) {
     fn numbers(value: &mut Value) -> Vec<&mut Value> {
         match value {

@@ -194,7 +194,7 @@ fn more_triangles_than_any_scene_has_are_refused_before_they_are_decoded() {
     assert!(matches!(error, SceneError::TooManyTriangles { .. }), "{error}");
 }
 
-/// Uses many primitives of one small stream, whose accessors claim many vertices.
+/// Uses many primitives with one small stream; their accessors claim many vertices.
 #[test]
 fn the_memory_of_all_primitives_is_bounded_together() {
     let (mut json, bytes) = parts(FILES[0][0]);

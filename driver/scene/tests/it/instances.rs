@@ -9,7 +9,7 @@ const TRIANGLES: u64 = 4096;
 /// Number of nodes at which the triangles of [`mesh`] become a group.
 const NODES: u64 = 65;
 
-/// File with a mesh of [`TRIANGLES`] coincident triangles that does not emit, in `nodes` nodes.
+/// Scene with `nodes` nodes, each with the same mesh of [`TRIANGLES`] coincident triangles that do not emit.
 fn mesh(nodes: u64, change: impl FnOnce(&mut Value)) -> Scene {
     let mut scene = Extended::new();
     let indices: Vec<u8> =

@@ -156,8 +156,8 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// A mesh without triangles does not traverse its list of instances, because many nodes can share a long
-/// list. This list is invalid: traversing it would be an error, because its rotations are zero.
+/// The loader skips the list of instances of a mesh without triangles, because many nodes can share a long
+/// list. The test's rotations are zero, so that reading the list would be an error.
 #[test]
 fn instances_of_points_are_not_traversed() {
     let mut scene = Extended::new();

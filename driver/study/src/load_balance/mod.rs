@@ -31,7 +31,7 @@ pub(crate) struct LinkModel {
     pub(crate) latency_seconds: f64,
 }
 
-/// Number of chips, their credits and their links.
+/// Number of chips, credits of each chip, and links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Setup {
     pub(crate) chips: usize,
@@ -163,8 +163,8 @@ impl Simulation {
         for chip in 0..self.chips.len() {
             self.deal(chip);
         }
-        // A tile's result arrives later than the result that freed the tile's credit, so that no new result
-        // precedes those already handled.
+        // The result of a tile arrives later than the result that freed the tile's credit. No new result can
+        // therefore precede a result that was already handled.
         while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
@@ -232,8 +232,8 @@ pub(crate) enum TileOrder {
     Picture,
     /// Random permutation with this seed.
     Random(u32),
-    /// Descending cost (Graham 1969). Costs are only known after the render, so that this is a bound and not
-    /// a policy.
+    /// Descending cost (Graham 1969). Costs are known only after the render, so that no scheduler can use
+    /// this order; it gives a bound.
     LongestFirst,
 }
 

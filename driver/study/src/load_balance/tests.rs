@@ -50,8 +50,8 @@ fn a_chip_waits_for_its_command_and_the_host_for_its_result() {
     // Each of two tiles takes the time of the command, the latency, the render, the latency, and the result.
     assert!((one.makespan_seconds - 2.0 * (0.01 + 0.1 + 1.0 + 0.1 + 0.02)).abs() < ROUNDING);
     let two = balance(&[1.0, 1.0], TileOrder::Picture, 2, 1, link);
-    // The command to the second chip is sent after 0.01 s for the first. The second result arrives 0.01 s
-    // after the first, and waits for the rest of the 0.02 s that the host takes for the first.
+    // The command to the second chip is sent 0.01 s after that to the first. The second result arrives 0.01 s
+    // after the first. It waits for the rest of the 0.02 s that the host takes for the first result.
     assert!((two.makespan_seconds - (0.02 + 0.1 + 1.0 + 0.1 + 0.01 + 0.02)).abs() < ROUNDING, "{two:?}");
     assert!((two.host_seconds - 0.06).abs() < ROUNDING);
     assert_eq!([one.most_in_flight, two.most_in_flight], [1, 2]);
@@ -70,7 +70,7 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     assert!(four.idle_share() <= two.idle_share() + ROUNDING);
 }
 
-/// With eight tiles for two cards, one tile waits behind the long one, however many credits a card has.
+/// With eight tiles for two cards, one tile waits behind the long one if a card has more than one credit.
 #[test]
 fn few_tiles_wait_behind_a_long_one() {
     let mut costs = [1.0; 8];
@@ -161,8 +161,8 @@ proptest! {
     }
 
     /// Graham 1966: no chip is idle while a tile waits, so that the last tile starts before an even share of
-    /// the remaining work is done. This requires links without cost and one credit, because a tile that waits
-    /// on a chip is not available to others.
+    /// the remaining work is done. The bound requires links without cost and one credit: with more credits, a
+    /// tile that waits for one chip is not available to other chips.
     #[test]
     fn one_credit_without_links_keeps_grahams_bound(
         costs in costs(), order in orders(), chips in 1..40_usize,

@@ -75,8 +75,8 @@ pub struct Provenance {
 }
 
 impl Report {
-    /// Adds `banner` to the report, and `Trial: ` to the title of each plot, because the files of plots can
-    /// be used without the page.
+    /// Adds `banner` to the report, and `Trial: ` to the title of each plot. The titles are marked too,
+    /// because the files of plots can be used without the page.
     #[must_use]
     pub(crate) fn marked(mut self, banner: String) -> Self {
         self.banner = Some(banner);

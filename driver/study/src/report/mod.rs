@@ -26,7 +26,6 @@ pub use self::table::Cell;
 pub(crate) use self::table::{Column, Table};
 use photoncard_picture::output::{self, OutputError};
 
-/// File name of the page.
 const PAGE: &str = "index.html";
 
 /// Error of writing a report.

@@ -33,7 +33,7 @@ pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) 
 }
 
 /// Panel of a plot over the number of chips, with one line per policy. The last argument has the label and
-/// the scale of the vertical axis, and the function that computes the plotted value.
+/// the scale of the vertical axis, and the function that computes the values to plot.
 pub(super) fn curves(
     title: &str,
     seconds: &[f64],

@@ -39,7 +39,7 @@ struct Frame {
     scale: Scale,
     file: &'static str,
     scene: &'static str,
-    /// True for the number of photons at which changes are measured.
+    /// True if the frame has the first number of photons, at which changes are measured.
     is_first: bool,
 }
 
@@ -291,15 +291,15 @@ fn changed_lines(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
     ]
 }
 
-/// Maximum fraction of the photons that can be replaced, if all chips are to receive the changed lines within
-/// the time of a frame, and the same fraction of the map's lines changes.
+/// Maximum fraction of the photons that can be replaced so that all chips receive the changed lines within
+/// the time of a frame. It is assumed that the same fraction of the map's lines changes.
 fn fitting_share(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, machine);
     (bytes / host.map.bytes.max(1) as f64).min(1.0)
 }
 
-/// Maximum of the measured fractions of replaced photons whose changed lines all chips can receive within the
-/// time of a frame; 0 if there is none.
+/// Maximum of the measured fractions of replaced photons for which all chips can receive the changed lines
+/// within the time of a frame; 0 if there is none.
 fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let fits = |bytes| upload(way, bytes, chips, machine) <= 1.0 / RATE;
     let shares = host.changes.iter().filter_map(|changed| match changed.change {

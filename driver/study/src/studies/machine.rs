@@ -28,10 +28,10 @@ struct Frame {
     workload: Workload,
     /// Cost by Table 7.1's constants.
     cost: Cost,
-    /// Counted arithmetic, and the cost that follows from it; `None` for a frame with the table's own counts.
+    /// Counted arithmetic, and the cost computed from it; `None` for a frame of Table 7.1.
     counted: Option<(Arithmetic, Cost)>,
-    /// Errors of the counts. They are zero for a frame with the table's own counts, and for a frame whose
-    /// tiles were all rendered.
+    /// Errors of the counts. They are zero for frames of Table 7.1, and for frames all of whose tiles were
+    /// rendered.
     errors: Errors,
     map: PhotonMapSize,
     machine: Machine,

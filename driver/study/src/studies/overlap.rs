@@ -1,5 +1,5 @@
-//! Compares the times of a frame on two chips: one that casts rays while its queue is drained, and the chip
-//! as it is built, which does not.
+//! Compares the times of a frame on two chips. One casts rays while its queue is drained; the other, the chip
+//! as it is built, does not.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -25,7 +25,7 @@ type Line = (GatherOrder, PhotonLayout);
 const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 
 /// Sizes of the queue, in gathers, for which times are compared. Points are measured with each size and with
-/// half of it.
+/// half of each.
 fn queues(scale: &Scale) -> Vec<u32> {
     scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192])
 }
@@ -45,8 +45,8 @@ fn half(scale: &Scale, line: Line, queue: Option<u32>) -> Point {
     point(scale, line, line.0.has_queue().then_some(half))
 }
 
-/// Points of `lines` with half the chip's own queue, and of [`SORT_LINES`] with each size of [`queues`] and
-/// half of it.
+/// Points of `lines` with half the chip's own queue, and points of [`SORT_LINES`] with each size of
+/// [`queues`] and with half of each.
 pub(super) fn points(scale: &Scale, lines: &[Line]) -> Vec<Point> {
     let halves = lines.iter().map(|&line| half(scale, line, None));
     let by_queue = queues(scale)

@@ -19,7 +19,8 @@ use super::present::{
 };
 use super::times::{self, TimedFrame};
 
-/// Order of gathers in a table's row: that of a chip, or `None` for all gathers of the frame along one curve.
+/// Order of gathers in a table's row: an order that chips support, or `None` for all gathers of the frame
+/// along one curve.
 type Order = Option<GatherOrder>;
 
 fn name(order: Order) -> &'static str {
@@ -322,8 +323,8 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     table
 }
 
-/// One series per order: bytes of the photon map fetched from DRAM, over `caches`. Each of `caches` has a
-/// horizontal position.
+/// Series of plots, one per order: bytes of the photon map fetched from DRAM, over `caches`. The number of
+/// each of `caches` is its horizontal position.
 fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettings)]) -> Vec<Series> {
     let line = |order: GatherOrder| {
         let points = caches.iter().map(|&(x, caches)| {

@@ -20,7 +20,7 @@ use super::present::{
 use super::workload::tile_seconds;
 use super::{flights, headlines};
 
-/// A line of a plot: its name, and its settings, one of which a sweep varies.
+/// A line of a plot: its name and its settings. A sweep varies one of the settings.
 type Line = (&'static str, fn(&Scale) -> RenderSettings);
 
 const NAIVE: Line = ("naive", |scale| scale.settings(GatherOrder::Naive));

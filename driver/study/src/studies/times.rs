@@ -11,7 +11,8 @@ use super::super::point::Point;
 use super::super::report::Cell;
 use super::{arithmetic, workload};
 
-/// Numbers of tasks (rays or gathers) in flight that are compared with the machine's own number.
+/// Numbers of tasks (rays or gathers) in flight, for which times are computed in addition to the machine's
+/// own number.
 const FEWER_TASKS: [u32; 2] = [1, 16];
 
 /// Work of a measured frame, and the machine for which times are computed.
@@ -19,8 +20,8 @@ pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
     /// Mean number of gathers in the queue when the chip begins to empty it. For an order of gathers without
-    /// a queue, it is the capacity of the chip's queue: the gathers are assumed to wait for the gather unit
-    /// there, in the order of arrival.
+    /// a queue, it is the capacity of the chip's queue: gathers are assumed to wait there, in the order of
+    /// arrival.
     drained: u64,
     has_queue: bool,
 }

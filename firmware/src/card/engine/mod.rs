@@ -39,7 +39,7 @@ pub(super) struct Engine<K: ChipKind> {
     tiles: Deque<Tile, MAX_TILES>,
     /// Number of tiles that the chip has begun and whose [`Reply::TileDone`] was not sent yet.
     begun: usize,
-    /// Tile whose pixels were sent but whose [`Reply::TileDone`] was not, with its counters.
+    /// Tile whose pixels were all sent, but whose [`Reply::TileDone`] was not; with the tile's counters.
     finished: Option<(u32, Counters)>,
     /// True if the host has announced that no tile follows for now.
     is_flushed: bool,

@@ -101,7 +101,7 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
     coefficients
 }
 
-/// Weight in the rotational gradient of a gather ray in cell `cell`, along tangent and bitangent.
+/// Weight of a gather ray in cell `cell` in the rotational gradient, along tangent and bitangent.
 pub(super) fn rotation(cell: u8) -> [f32; 2] {
     let [azimuth, sine_squared] = cell_centre(cell);
     let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));

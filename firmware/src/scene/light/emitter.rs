@@ -1,5 +1,5 @@
-//! Sampling of emitters: emissive triangles, point lights and spot lights. The light tree selects an emitter;
-//! a point on a triangle is uniform by area.
+//! Sampling of emitters: emissive triangles, point lights and spot lights. The light tree selects an emitter.
+//! On an emissive triangle, a point is then chosen uniformly by area.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;

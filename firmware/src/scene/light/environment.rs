@@ -1,8 +1,8 @@
 //! Environment light: infinitely distant light, given by an equirectangular map. To sample a direction, the
 //! map is divided into a grid of cells of equal angles. A row and then a column are chosen in proportion to
 //! their light; the direction is uniform in solid angle within the cell. A cell with an uneven distribution
-//! of light, for example with the sun, is subdivided into parts of equal solid angle, which are chosen in the
-//! same way.
+//! of light, for example with the sun, is subdivided into parts of equal solid angle. The parts are chosen in
+//! the same way.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -122,21 +122,21 @@ impl Cells {
         Self { columns, rows }
     }
 
-    /// Index, in the section, of the first threshold of row `row`'s cells.
+    /// Index of the first threshold of the cells of row `row`, in [`SectionKind::EnvironmentCells`].
     fn first_of_row(&self, row: u32) -> u32 {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
 
-    /// Cosine of the angle to +y at the parallel that divides a row such that the fraction `share` of its
-    /// solid angle lies above.
+    /// Cosine of the angle between +y and the circle of latitude that has the fraction `share` of the row's
+    /// solid angle above it.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
     }
 
-    /// Fraction of a row's solid angle that lies above the cosine `cosine` to +y: the inverse of
-    /// [`Self::cosine`].
+    /// Fraction of a row's solid angle that lies above the circle of latitude whose angle to +y has the
+    /// cosine `cosine`: the inverse of [`Self::cosine`].
     fn share(&self, row: u32, cosine: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
@@ -157,16 +157,16 @@ impl Cells {
 
 /// Parts of a subdivided cell: a grid of `side` by `side` parts of equal solid angle.
 struct Parts {
-    /// Index, in the section, of the first threshold of the cell's parts. The thresholds of the rows come
-    /// first, then those of the parts in each row.
+    /// Index of the first threshold of the cell's parts, in [`SectionKind::EnvironmentCells`]. The thresholds
+    /// of the rows of parts come first, then those of the parts in each row.
     first: u32,
     side: u32,
 }
 
 impl Parts {
-    /// Looks up the parts of a cell; returns `None` if the cell is not subdivided. The section holds, after
-    /// the thresholds of all cells, the number of subdivided cells, the value of `side`, and the sorted
-    /// numbers of the subdivided cells.
+    /// Looks up the parts of a cell; returns `None` if the cell is not subdivided. Section
+    /// [`SectionKind::EnvironmentCells`] holds, after the thresholds of all cells, the number of subdivided
+    /// cells, the value of `side`, and the sorted numbers of the subdivided cells.
     fn of(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -195,7 +195,7 @@ impl Parts {
         Ok(None)
     }
 
-    /// Index, in the section, of the first threshold of row `row`'s parts.
+    /// Index of the first threshold of the parts in row `row`, in [`SectionKind::EnvironmentCells`].
     fn first_of_row(&self, row: u32) -> u32 {
         self.first.wrapping_add(self.side.wrapping_mul(row.wrapping_add(1)))
     }

@@ -4,7 +4,8 @@
 //! leaves of the light tree (module `tree`); distant lights; and the environment. The card image's header
 //! holds the probability of each kind. One point of the unit square makes all choices: each choice rescales a
 //! coordinate within the chosen interval to [0, 1) for the next choice ([`Fraction`]). Neighbouring points of
-//! the square therefore map to neighbouring points of one light. A stratified pattern stratifies the lights.
+//! the square therefore map to neighbouring points of one light, and stratified points give stratified
+//! choices.
 //!
 //! Sampling and evaluation of the density use the same floating-point operations. The density of a gather ray
 //! that hits a light therefore differs from that of a shadow ray only by the rounding of the hit point.

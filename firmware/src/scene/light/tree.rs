@@ -4,12 +4,12 @@
 //!
 //! At each node, one of up to four children is chosen with a probability proportional to an estimate of its
 //! light at the receiver. The estimate is power times the cosines at receiver and emitter, divided by
-//! `max(d^2, r^2)`, where `r` is the radius of the child's bounding sphere and `d` is the distance to its
+//! `max(d^2, r^2)`. Here `r` is the radius of the child's bounding sphere, and `d` the distance to its
 //! centre. Each cosine is a weighted mean of the cosine at the centre and of the greatest cosine that the
-//! sphere and the cone of normals allow. The papers use the greatest cosine alone. A large lamp reaches this
-//! cosine at few points, and would take rays from emitters that contribute more. A fraction [`EVEN`] of the
-//! choices is uniform, so that emitters with a low estimate are still sampled. A child whose greatest cosine
-//! is negative cannot light the receiver and is excluded.
+//! sphere and the cone of normals allow. The papers use the greatest cosine alone. It overestimates a large
+//! lamp, which reaches this cosine at few points, and so takes rays from emitters that contribute more. A
+//! fraction [`EVEN`] of the choices is uniform, so that emitters with a low estimate are still sampled. A
+//! child whose greatest cosine is negative cannot light the receiver and is excluded.
 
 use glam::Vec3;
 use photoncard_shared::address::LINE_BYTES;
@@ -37,11 +37,11 @@ const EMITTER_BOUND: f32 = 1.0 / 8.0;
 /// Weight of the greatest cosine in [`mean_cosine`] for a child that is a node, whose emitters can be
 /// anywhere in its bounding sphere. This value gives the least noise with 10,000 emitters.
 const NODE_BOUND: f32 = 1.0 / 2.0;
-/// Greatest cosine below which a child is excluded. It is less than 0 by more than the rounding error of the
-/// cones' axes.
+/// Limit of the greatest cosine, below which a child is excluded. It lies below 0 by more than the rounding
+/// error of the cones' axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
-/// Result of [`select_emitter`].
+/// Emitter that [`select_emitter`] has selected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
     /// Index of the emitter.
@@ -119,7 +119,7 @@ fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Re
     Ok(core::array::from_fn(|child| line.child(child)))
 }
 
-/// Node number that no tree contains.
+/// Node number of an empty cache entry; no tree contains this node.
 const NO_NODE: u32 = u32::MAX;
 /// Number of nodes whose `Choice`s are cached.
 const KEPT_CHOICES: usize = 4;
@@ -134,12 +134,12 @@ pub struct LightChoices {
 }
 
 impl LightChoices {
-    /// Creates a receiver without cached choices.
+    /// Creates the choices for a receiver, with an empty cache.
     pub fn new(receiver: Receiver) -> Self {
         Self { receiver, kept: [(NO_NODE, Choice::NONE); KEPT_CHOICES] }
     }
 
-    /// Returns the choice at a node, from the cache if possible; otherwise the node is read.
+    /// Returns the child probabilities at a node. Reads the node if they are not in the cache.
     fn at(&mut self, scene: &SceneImage, memory: &mut impl MemoryPort, node: u32) -> Result<&Choice, Fault> {
         let [first, second, third, fourth] = &mut self.kept;
         let kept = match node as usize % KEPT_CHOICES {
@@ -155,7 +155,7 @@ impl LightChoices {
     }
 }
 
-/// Children of a node with their probabilities; `None` for those that cannot light the receiver.
+/// Children of a node with their probabilities; `None` for a child that cannot light the receiver.
 #[derive(Clone, Copy)]
 struct Choice {
     options: [Option<Weighted>; LIGHT_CHILDREN],

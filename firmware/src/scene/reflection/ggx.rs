@@ -20,10 +20,12 @@ use glam::Vec3;
 use super::ggx_albedo::albedo_shares;
 use crate::vector::{about, max, max_component, min, mirror, unit};
 
-/// Minimum of `a`. The lobe is then 0.06 degrees wide, and `f32` still resolves the half vector within it.
+/// Minimum of `a`. At this `a`, the lobe is 0.06 degrees wide, and `f32` still resolves the half vector
+/// within it.
 pub(super) const MIN_ALPHA: f32 = 1e-3;
 
-/// Minimum of `a` for [`GgxLobe::gathers_caustics`]. Half of such a lobe's light is within 3.4 degrees.
+/// Minimum of `a` for [`GgxLobe::gathers_caustics`]. At this `a`, half of the lobe's light is within 3.4
+/// degrees of the mirror direction.
 const MIN_CAUSTIC_ALPHA: f32 = 0.03;
 
 /// Lower limit of the albedo by which energy compensation divides.
@@ -42,7 +44,6 @@ pub(super) struct GgxLobe {
     pub(super) albedo: Vec3,
     /// Coefficients of `F0` and `F90` in the albedo `E = F0 A + F90 B`: `[A, B]`.
     shares: [f32; 2],
-    /// Method that estimates the light reflected by the lobe at the end of a ray.
     pub(super) estimate: Estimate,
 }
 
@@ -55,8 +56,8 @@ pub(super) enum Estimate {
     /// A ray follows the lobe. Caustic photons of lights without an area are stored and gathered for the
     /// lobe.
     Ray,
-    /// Like [`Self::Ray`], but no caustic photons are stored for the lobe. Those stored for the Lambertian
-    /// part of the same surface are gathered.
+    /// Like [`Self::Ray`], but no caustic photons are stored for the lobe. Instead, the caustic photons that
+    /// are stored for the Lambertian part of the same surface are gathered.
     RayBesideBase,
     /// A ray follows the lobe, and no photons are gathered for it. Lobes of coats and of rough transmission
     /// use this method.
@@ -75,7 +76,7 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
-    /// Computes the quantities from unit vectors. Both directions are on the normal's side.
+    /// Computes the cosines and the sine from unit vectors. Both directions are on the normal's side.
     #[inline(always)]
     pub(super) fn new(normal: Vec3, outgoing: Vec3, incident: Vec3) -> Self {
         let half = unit(outgoing + incident);
@@ -105,7 +106,7 @@ impl GgxLobe {
         }
     }
 
-    /// Marks the lobe as [`Estimate::RayAlone`].
+    /// Marks the lobe as one that rays follow, without a gather of photons ([`Estimate::RayAlone`]).
     pub(super) fn as_layer(self) -> Self {
         Self { estimate: Estimate::RayAlone, ..self }
     }
@@ -119,7 +120,8 @@ impl GgxLobe {
         self.dimmed(Vec3::ONE + self.f0 * ((1.0 - of_white) / of_white))
     }
 
-    /// Maximum channel, 0 to 1, of the albedo of a lobe that differs from this one by its `f0` and `f90`.
+    /// Maximum channel, 0 to 1, of the albedo of a lobe with the given `f0` and `f90`, and with this lobe's
+    /// roughness and outgoing direction.
     pub(super) fn albedo_of(&self, f0: Vec3, f90: f32) -> f32 {
         let [of_f0, of_f90] = self.shares;
         min(max_component(f0) * of_f0 + f90 * of_f90, 1.0)
@@ -132,8 +134,8 @@ impl GgxLobe {
     }
 
     /// Returns true if caustic photons of lights without an area are gathered for the lobe. The lobe must be
-    /// wider than the rounding error of photon directions, and than the angle of a photon's disc seen from
-    /// the object that the lobe reflects.
+    /// wider than the rounding error of photon directions, and than the angle that a photon's disc subtends
+    /// at the object that the lobe reflects.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
@@ -169,7 +171,7 @@ impl GgxLobe {
         self.fresnel(geometry) * (visible * incident)
     }
 
-    /// Ratio `f / (albedo p)`, by maximum channel, dimensionless.
+    /// Ratio `f / (albedo p)`, dimensionless, from the maximum channels of `f` and of the albedo.
     #[inline(always)]
     pub(super) fn gain(&self, geometry: &Geometry) -> f32 {
         let Geometry { outgoing, .. } = *geometry;
@@ -178,9 +180,9 @@ impl GgxLobe {
         max_component(self.fresnel(geometry)) * visible / albedo
     }
 
-    /// Colour by which a [`Kernel`](super::ggx_kernel::Kernel) is multiplied in place of `F`: the lobe's
-    /// albedo divided by that of a lobe with `F = 1`. Being the mean of `F`, it makes the reflection of
-    /// uniform light exact.
+    /// Colour by which a [`Kernel`](super::ggx_kernel::Kernel) is multiplied in place of `F`. It is the mean
+    /// of `F`: the lobe's albedo divided by the albedo of a lobe with `F = 1`. The reflection of uniform
+    /// light is thus exact.
     pub(super) fn colour(&self) -> Vec3 {
         let [of_f0, of_f90] = self.shares;
         self.albedo * (1.0 / max(of_f0 + of_f90, f32::MIN_POSITIVE))

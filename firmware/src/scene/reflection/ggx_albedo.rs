@@ -27,8 +27,8 @@ pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f
     (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
 }
 
-/// Converts a coordinate in [0, 1] to the index of the last table entry that is not after it, and to the
-/// interpolation weight of the next entry, 0 to 1. NaN counts as 0.
+/// Converts a coordinate in [0, 1] to the index of the table entry at or before it, and to the interpolation
+/// weight of the next entry, 0 to 1. NaN counts as 0.
 #[inline(always)]
 fn cell(coordinate: f32) -> (usize, f32) {
     let scaled = if coordinate > 0.0 { coordinate } else { 0.0 } * (SIDE - 1) as f32;

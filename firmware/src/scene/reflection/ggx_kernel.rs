@@ -7,8 +7,8 @@ use glam::Vec3;
 use super::ggx::{Geometry, MIN_ALPHA, distribution, visibility};
 use crate::vector::max;
 
-/// GGX lobe with `F = 1` for one outgoing direction, scaled to 0 to 1: `D V` divided by its upper bound
-/// `1 / (2 pi a^3 n.o)`. Sums of powers times this factor do not exceed sums of powers.
+/// GGX lobe with `F = 1` for one outgoing direction, scaled to 0 to 1: `D V` divided by its upper bound `1 /
+/// (2 pi a^3 n.o)`. A sum of powers times this factor does not exceed the sum of the powers.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     normal: Vec3,

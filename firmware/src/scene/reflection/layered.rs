@@ -247,8 +247,8 @@ fn base(
 }
 
 /// Does `base` for rough glass. A thin wall transmits by a GGX lobe on its far side. A volume reflects by a
-/// GGX lobe outside. Inside it reflects, and on both sides it transmits, perfectly specularly at a microfacet
-/// that is sampled by visible normals (Walter et al. 2007).
+/// GGX lobe outside. Its reflection inside, and its transmission on both sides, are perfectly specular at a
+/// microfacet that is sampled by visible normals (Walter et al. 2007).
 fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;

@@ -25,9 +25,10 @@ pub(super) struct MetallicRoughness {
     pub(super) grazing: f32,
     pub(super) metallic: f32,
     pub(super) roughness: f32,
-    /// True if the material has [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
+    /// True if rays follow the lobe, by the flag [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
     pub(super) has_narrow_lobe: bool,
-    /// True if the material has [`COMPENSATED`](photoncard_shared::layout::COMPENSATED).
+    /// True if the lobe includes multiple scattering, by the flag
+    /// [`COMPENSATED`](photoncard_shared::layout::COMPENSATED).
     pub(super) is_compensated: bool,
 }
 
@@ -41,7 +42,8 @@ impl MetallicRoughness {
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
     }
 
-    /// Sum of the lobe multiplied by `share` and a Lambertian part with the albedo `diffuse`.
+    /// Reflection of two parts: the lobe multiplied by `share`, and a Lambertian part with the albedo
+    /// `diffuse`.
     pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0 * share, f90 * share, cosine);

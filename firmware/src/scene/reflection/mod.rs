@@ -1,12 +1,12 @@
 //! Reflection functions without their perfectly specular part ([`super::Specular`]): evaluation, sampling,
 //! and the form stored in the gather queue.
 //!
-//! | question | answered by |
+//! | subject | item |
 //! |---|---|
-//! | which parts there are | [`Reflection`] |
-//! | `f`, albedos, sampled directions and their densities, seen from one direction | [`Reflector`] |
-//! | materials that photons are stored on | [`keeps_photons`] |
-//! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
+//! | the parts of a reflection function | [`Reflection`] |
+//! | `f`, albedos, sampled directions and their densities, for one outgoing direction | [`Reflector`] |
+//! | choice of the materials on which photons are stored | [`keeps_photons`] |
+//! | the stored form for the gather queue, and its sums over photons | [`PartialReflection`] |
 //!
 //! A reflection is a Lambertian part and one lobe. Each model of a lobe has a module here, such as `phong` or
 //! `ggx`, and a case in `lobe`, [`Reflector`] and [`PartialReflection`]. Callers need not know the model.
@@ -85,8 +85,8 @@ impl Reflection {
     }
 
     /// Returns true if the lobe is narrow: a density estimate cannot resolve it, because few of the k nearest
-    /// photons arrive within it. Gather rays and photons continue in a sampled direction of a narrow lobe. An
-    /// eye path ends there, and gather rays are cast.
+    /// photons arrive within it. Gather rays and photons that hit a narrow lobe continue in a sampled
+    /// direction. An eye path ends at the narrow lobe, and gather rays are cast from there.
     #[inline(always)]
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
@@ -139,7 +139,8 @@ impl Reflection {
             && !matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.estimate == Estimate::RayBesideBase)
     }
 
-    /// Removes the Lambertian part, and marks the narrow lobe as [`Estimate::RayBesideBase`].
+    /// Removes the Lambertian part. Marks the narrow lobe as one for which no caustic photons are stored
+    /// ([`Estimate::RayBesideBase`]).
     #[must_use]
     pub(in crate::scene) fn narrow_lobe_beside_base(self) -> Self {
         let mut part = self.narrow_lobe();
@@ -151,7 +152,7 @@ impl Reflection {
         part
     }
 
-    /// Removes the Lambertian part; black if the lobe is not narrow.
+    /// Removes the Lambertian part. Returns a black reflection if the lobe is not narrow.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { self.without_lambertian() } else { Self::BLACK }

@@ -10,8 +10,8 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// Returns true if photons are stored on surfaces of a material. This is so if, at some texel, its base
-/// reflects light other than by a narrow lobe.
+/// Returns true if photons are stored on surfaces of a material. This is the case if, at some texel, the base
+/// reflects light by more than a narrow lobe.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -31,8 +31,8 @@ pub fn keeps_photons(
 }
 
 /// Returns true if photons are stored at a texel with the metalness `metallic` and 1 in all other textures.
-/// The view is along the normal, where the dielectric's Fresnel reflection, which dims the base, is least. If
-/// photons are stored at some metalness in a range, they are stored at one of the range's ends.
+/// The view is along the normal, where the dielectric's Fresnel reflection dims the base least. If photons
+/// are stored at some metalness in a range, they are stored at one of the range's ends.
 fn keeps(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };

@@ -11,7 +11,7 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
-/// A reflection function in 13 bytes, of which all that does not depend on a photon is evaluated (`S_B` in
+/// Reflection function in 13 bytes. All terms that do not depend on a photon are already evaluated (`S_B` in
 /// Steinhurst's dissertation, 2007, section 7.4).
 ///
 /// [`Self::encode`] is called once per gather: it combines albedos, weight, units and the lobe's constant

@@ -48,7 +48,8 @@ pub struct Reflector {
 }
 
 impl Reflector {
-    /// BRDF `f`, 1/sr, for light from the unit vector `incident`, above triangle and shading horizon.
+    /// BRDF `f`, 1/sr, for light from the unit vector `incident`, which must be above triangle and shading
+    /// horizon.
     #[inline(always)]
     pub fn evaluate(&self, incident: Vec3) -> Vec3 {
         if self.reflection.is_lambertian() {
@@ -131,8 +132,8 @@ impl Reflector {
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// Exponent `n` of a Phong lobe `cos^n alpha` as wide as the lobe. It is `1 / (2 a^2)` for a GGX lobe
-    /// (Walter et al. 2007), and 0 for a sheen lobe.
+    /// Exponent `n` of the Phong lobe `cos^n alpha` that is as wide as this lobe. It is `1 / (2 a^2)` for a
+    /// GGX lobe (Walter et al. 2007), and 0 for a sheen lobe.
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
         match &self.reflection.lobe {

@@ -15,7 +15,7 @@ use glam::Vec3;
 use super::ggx_albedo::{SIDE, interpolated};
 use crate::vector::{about, max, max_component, unit};
 
-/// Minimum roughness. At a smaller one, more light than arrives would be reflected at grazing angles.
+/// Minimum roughness. A smaller roughness would reflect more light than arrives at grazing angles.
 const MIN_ROUGHNESS: f32 = 0.25;
 /// Density of sampled directions, 1/sr: uniform over the hemisphere.
 const DENSITY: f32 = 0.5 / PI;

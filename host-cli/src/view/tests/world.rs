@@ -32,7 +32,7 @@ pub(super) struct ModelPage {
     pub(super) state: Option<Value>,
     pub(super) errors: u64,
     version: u32,
-    /// Number of requests of which the page has received tiles.
+    /// Number of requests for which the page has received a tile.
     pub(super) versions: u64,
 }
 
@@ -219,8 +219,8 @@ impl World {
         self.send(number, &serde_json::json!({"type": "shown", "version": 1, "bytes": bytes}));
     }
 
-    /// Performs all remaining work, with a card, while all pages read and acknowledge. Panics if the work
-    /// does not end.
+    /// Lets the painter finish all work on an available card, while all pages read and acknowledge. Panics if
+    /// the work does not end.
     pub(super) fn settle(&mut self) {
         self.has_card = true;
         for _ in 0..20_000 {

@@ -45,8 +45,8 @@ impl CommandTree {
         having.map(|(command, _)| command.as_str()).collect()
     }
 
-    /// Returns a message if the program refuses these arguments. With a final `--help`, the program only
-    /// parses them.
+    /// Returns a message if the program refuses these arguments. An appended `--help` makes the program only
+    /// parse them.
     pub(crate) fn defect_of_arguments(&self, arguments: &[&str]) -> Option<String> {
         let outcome = self.room.run(&[arguments, &["--help"]].concat());
         let said = outcome.stderr.trim();
@@ -83,8 +83,7 @@ impl CommandTree {
         unknown.map(|option| format!("`photoncard {command}` has no {option}")).collect()
     }
 
-    /// Returns whether `group` is a group of commands, and the word behind it in `form` names no command of
-    /// the group.
+    /// Returns whether `group` has subcommands, and the next word of `form` is none of them.
     fn lacks(&self, group: &str, form: &str) -> bool {
         let below = form[group.len()..].trim_start();
         let is_group = self.options.keys().any(|command| command.starts_with(&format!("{group} ")));

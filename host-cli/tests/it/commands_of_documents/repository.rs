@@ -30,7 +30,7 @@ fn is_path(word: &str) -> bool {
         && stem.chars().all(is_plain)
 }
 
-/// Defect of a word that is a path in the repository but does not exist.
+/// Defect of a word that names a path in the repository, if this path does not exist.
 pub(crate) fn defect_of_path(word: &str) -> Option<String> {
     let word = word.strip_prefix("./").unwrap_or(word);
     (is_path(word) && !path(word).exists()).then(|| format!("{word} does not exist"))

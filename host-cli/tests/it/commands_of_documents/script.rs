@@ -96,7 +96,7 @@ pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<Stri
     defects
 }
 
-/// Defects of options with values: one command must have all the options, and accept each value that is no
+/// Defects of options with values: some command must have all these options, and accept each value that is no
 /// placeholder.
 fn defects_of_options(tree: &CommandTree, words: &[&str]) -> Vec<String> {
     let options: Vec<_> = words.iter().copied().filter(|word| word.starts_with("--")).collect();

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Output, Stdio};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Options of a minimal render. A test may state others in their place or besides.
+/// Options of a minimal render. A test may replace them or add others.
 const SMALL: [(&str, &str); 6] = [
     ("--quality", "paper"),
     ("--size", "8x8"),
@@ -180,7 +180,7 @@ pub(crate) fn scene_bytes() -> Vec<u8> {
     bytes
 }
 
-/// Scene of a floor with two triangles under a lamp with one, seen by the camera `eye`.
+/// Scene of a floor (two triangles) under a lamp (one triangle), seen by the camera `eye`.
 pub(crate) fn scene() -> Value {
     scene_of(&scene_bytes())
 }

@@ -123,8 +123,8 @@ fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
     assert_eq!(shown.collect::<Vec<_>>(), denoised.pixels);
 }
 
-/// The work in the tile headers of the final picture adds up to that of the shown command, also after several
-/// passes.
+/// The counts in the tile headers of the final picture add up to those that the shown command reports, also
+/// after several passes.
 #[test]
 #[cfg(unix)]
 fn tiles_report_their_work() {

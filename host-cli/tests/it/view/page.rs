@@ -101,11 +101,10 @@ pub(crate) struct Page {
     pub(crate) last: HashMap<String, Value>,
     /// Values of each pixel as shown: radiance or a layer.
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
-    /// Number of the request, and side of the square that a rendered pixel covers, pixels, for each tile
-    /// received.
+    /// Request number of each received tile, and side of the square that one rendered pixel covers, pixels.
     pub(crate) steps: Vec<(u32, u32)>,
-    /// Gathers, irradiance records and DRAM lines of the tiles of the newest picture at full resolution, by
-    /// each tile's corner.
+    /// Numbers of gathers, irradiance records and DRAM lines for each tile of the newest picture at full
+    /// resolution, by the tile's corner.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 
@@ -155,8 +154,8 @@ impl Page {
         self.wait(kind, |_| true)
     }
 
-    /// Waits for a final picture, and returns its state. If the last state is `settled`, waits for a newer
-    /// request's.
+    /// Waits for a final picture, and returns its state. If the last state is `settled` already, waits for
+    /// the final picture of a newer request.
     pub(crate) fn settle(&mut self) -> Value {
         let before = self
             .last

@@ -80,8 +80,8 @@ fn opened(browser: &mut Browser, file: &str) -> f64 {
     first.as_f64().unwrap() - started
 }
 
-/// Median times from a camera move to each of `parts`, the page's names of stages of the picture,
-/// milliseconds.
+/// Median times from a camera move to each of the stages `parts` of the picture, milliseconds. The stages
+/// have the page's names.
 fn moved<const N: usize>(
     browser: &mut Browser,
     room: &Room,
@@ -110,7 +110,8 @@ fn moved<const N: usize>(
     times.map(median)
 }
 
-/// Median number of complete pictures per second while the camera turns, read each half second from 2 to 6 s.
+/// Median number of complete pictures per second while the camera turns, read every half second from 2 to 6 s
+/// after the start.
 fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "256x256");
     let mut tab = refined(browser, &view);

@@ -262,7 +262,7 @@ fn a_page_of_another_origin_is_refused() {
 /// times.
 const MAX_PAGE: u64 = 8 << 20;
 /// Maximum growth of the command's memory after many actions, bytes: tiles of two pictures and three films,
-/// with all layers, of 700x500 pixels, the largest window.
+/// each of 700x500 pixels (the largest window) with all layers.
 const MAX_COMMAND: u64 = 5 * 700 * 500 * 112;
 
 fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {

@@ -153,7 +153,7 @@ fn labels_of(material: &str) -> String {
     )
 }
 
-/// Mean over pixels and channels of 255 minus the code.
+/// Mean of `255 - code` over all channels of all pixels.
 pub(crate) fn darkness(pixels: &[[u8; 3]]) -> f64 {
     let sum: u64 = pixels.as_flattened().iter().map(|&code| u64::from(255 - code)).sum();
     sum as f64 / (3 * pixels.len()) as f64

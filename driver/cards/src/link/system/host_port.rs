@@ -46,7 +46,6 @@ struct Host {
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
 /// Time within which a host must send its first whole frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
-/// Byte that ends a frame.
 const FRAME_END: u8 = 0;
 
 impl HostPort {

@@ -38,7 +38,7 @@ pub enum ListenAddress {
     },
 }
 
-/// Default host name, which only this machine can reach.
+/// Default host name: an address that only this machine can reach.
 const LOCAL_HOST: &str = "127.0.0.1";
 
 impl FromStr for ListenAddress {

@@ -31,9 +31,9 @@ pub enum RemoteAddress {
 
 /// Default speed of a serial port, bit/s.
 const DEFAULT_BAUD: u32 = 115_200;
-/// Minimum speed of a serial port, bit/s. A card is silent while it receives two whole frames and
-/// acknowledges them. An acknowledgement must arrive within the 10 s after which a card counts as lost, even
-/// if the previous one was lost.
+/// Minimum speed of a serial port, bit/s. A card acknowledges every second message, and counts as lost after
+/// 10 s of silence. At this speed it receives four of the longest frames in 9 s, so that one acknowledgement
+/// may be lost.
 const MIN_BAUD: u32 = 4800;
 
 impl RemoteAddress {

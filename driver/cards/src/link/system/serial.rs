@@ -90,8 +90,8 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     settings.open_native().map_err(device_error)
 }
 
-/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed. `serialport` sets no
-/// speed if it is given a speed of 0.
+/// Returns whether a path names a pseudo terminal of macOS. Such a terminal rejects any speed. `serialport`
+/// sets no speed if it is given a speed of 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))

@@ -103,7 +103,7 @@ impl Layer {
 
 /// Crossings of all chords with the triangles in a ball.
 pub(super) struct Crossings {
-    /// Layers of crossings, by batch of chords.
+    /// Crossings of each batch of chords, in one layer per triangle.
     pub(super) layers: [Vec<Layer>; BATCHES],
     /// For each chord, the number of solids that contain its point at [`Self::height`], minus the number that
     /// contain the reference point.
@@ -126,7 +126,6 @@ impl Crossings {
         self.height = height;
     }
 
-    /// Sets the entry of `Self::depths` for one chord.
     pub(super) fn set_depth(&mut self, chord: usize, depth: i32) {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
@@ -148,7 +147,7 @@ impl Crossings {
 /// The n-th crossing from above of each of sixteen chords.
 #[derive(Clone, Copy)]
 struct Level {
-    /// Sort keys; 0 for a chord with fewer crossings.
+    /// Sort keys; 0 for a chord with fewer than n crossings.
     keys: [u32; LANES],
     /// `f32::to_bits` of the slopes `1 / cos`: surface area per area of the disc.
     slopes: [u32; LANES],
@@ -279,7 +278,7 @@ pub(super) struct Covered {
     pub(super) normal: u8,
     /// Distance to the crossing above, in radii of the ball.
     pub(super) gap: f32,
-    /// Interval of heights that are nearer to this crossing than to those above and below it.
+    /// Interval of heights that are nearer to this crossing than to the crossings above and below it.
     pub(super) heights: [f32; 2],
 }
 

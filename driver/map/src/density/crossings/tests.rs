@@ -5,7 +5,6 @@ use photoncard_firmware::simd::Level as Instructions;
 
 use super::*;
 
-/// Kernel that sorts layers.
 struct Sort<'a>(&'a [Layer]);
 
 impl Kernel for Sort<'_> {

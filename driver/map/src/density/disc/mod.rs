@@ -4,9 +4,9 @@
 //! however, and counts the photons with a similar normal on all surfaces in the sphere. Near an edge or in a
 //! corner these surfaces have less area than the disc, and the estimate would be too dark: on a Cornell box
 //! by some 2 % of all indirect light. On steps or between balusters they can have more area, and the estimate
-//! would be too bright. This module measures the area once per photon, with the radius of a gather at the
-//! photon, along chords of the sphere ([`super::chords`]). A gather then divides by this area
-//! ([`photoncard_firmware::photon`]).
+//! would be too bright. This module measures the area once per photon, as a fraction of the disc's area,
+//! along chords of a sphere with the radius of a gather ([`super::chords`]). A gather then divides by this
+//! area ([`photoncard_firmware::photon`]).
 //!
 //! Most photons lie inside a large flat surface and have the fraction 1. Leaves of the photon map with only
 //! such photons are recognized by the triangles around them. The photons of any other leaf share the search
@@ -38,19 +38,18 @@ use crate::photon::PhotonError;
 const LEAVES_PER_TASK: usize = 64;
 /// Minimum cosine between the normals of photons that share chords.
 const MIN_SHARED_COSINE: f32 = 0.85;
-/// Height of the reference point (`ChordFrame::open`) above a photon, in radii of a gather, if no surface
-/// is nearer.
+/// Maximum height of the reference point (`ChordFrame::open`) above a photon, in radii of a gather.
 const OPEN_HEIGHT: f32 = 0.1;
 /// Radius of the sphere in which a gather looks for hidden surfaces, divided by the radius of a gather at the
 /// photon. It exceeds 1 because the point of a gather lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Maximum difference between two hidden fractions within [`MARGIN`] radii of a gather: the fraction of the
-/// surface area and the fraction of the photons' power that the measured photon cannot see. Above it, the
-/// gather uses only the photons in its visible region.
+/// Maximum of `|a - p|`. `a` is the fraction of the surface area, and `p` the fraction of the photons' power,
+/// that a photon cannot see within [`MARGIN`] radii of a gather. Above this difference, the gather uses only
+/// the photons in its visible region.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Maximum difference between the two hidden fractions around a group of photons, times the ratio of the
-/// group's disc area to a photon's. Up to this product, all photons of the group have the fractions of their
-/// whole discs.
+/// Maximum of `(outer / (MARGIN radius))^2 |a - p|` at which all photons of a group get the fractions of
+/// their whole discs. `a` and `p` are the hidden fractions of area and power for the group's first photon, in
+/// the whole ball. `outer` and `radius` are those of its [`Cluster`].
 const NEAR_DIFFERENCE: f32 = 0.03;
 /// Factor of the estimated gather radius `BY_SPREAD d sqrt(k / n)` at a leaf, for gathers of k photons. The
 /// leaf has n photons within the distance d of its middle photon.
@@ -58,7 +57,7 @@ const BY_SPREAD: f32 = 1.2;
 /// Maximum distance at which a photon is evidence that a surface is lit ([`super::evidence`]), divided by the
 /// radius of a gather.
 const EVIDENT: f32 = 0.7;
-/// Distance behind a hit at which a ray continues, in radii of the ball.
+/// Distance up to which hits along a ray count as one hit, in radii of the ball.
 const STEP: f32 = 1e-5;
 
 /// Disc fraction of a photon. It refers to the whole disc or only to the region that the photon sees.
@@ -118,7 +117,7 @@ struct Meter<'a> {
     sides: &'a SideTable,
     same: &'a SameSurfaces,
     searcher: Searcher<'a>,
-    /// Radius of most gathers, metres.
+    /// Radius that most gathers do not exceed, metres.
     usual: f32,
     surroundings: Surroundings,
     evidence: Evidence,
@@ -127,7 +126,7 @@ struct Meter<'a> {
     /// True if [`Self::surroundings`] contains all triangles in the ball.
     is_complete: bool,
     chords: Chords,
-    /// Chords of balls of many triangles.
+    /// Smaller set of chords, for balls with many triangles.
     few_chords: Chords,
     crossings: Crossings,
     covered: Vec<Covered>,
@@ -330,8 +329,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Measures, within two radii (metres) of a photon, the area of the surfaces that its gathers count and
-    /// the area of the part that the photon sees.
+    /// Computes the [`Areas`] of surfaces around a photon. The two radii, metres, are those of the photon's
+    /// sphere and of the larger sphere.
     fn seen(
         &self,
         surfaces: &OpenSurfaces,
@@ -348,8 +347,8 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds to [`Self::surfaces`] the crossings below others (`Self::covered`) that a photon of the map shows
-    /// to be lit ([`super::evidence`]). `photon` is the position of the photon whose disc is measured. A
+    /// Adds the lit crossings of `Self::covered` to [`Self::surfaces`]. A crossing is lit if a photon is
+    /// stored near it ([`super::evidence`]). `photon` is the position of the photon whose disc is measured. A
     /// crossing is skipped if the gap to the crossing above it is within the error of the photon grid.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {

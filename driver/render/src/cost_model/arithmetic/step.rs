@@ -87,8 +87,7 @@ pub enum Step {
     Photon,
     /// Distance to one photon of the kd-tree.
     TreePhoton,
-    /// Guess of the interval that contains the k-th smallest distance. Its work is divided evenly among the
-    /// candidates that a selection reads.
+    /// Guess of the interval that contains the k-th smallest distance, per candidate that a selection reads.
     Selected,
     /// Comparison of two distances.
     Compared,
@@ -208,8 +207,8 @@ impl Step {
             Self::Photon => contents.photons,
             Self::TreePhoton => contents.tree_photons,
             Self::Selected => counters.photons_selected,
-            // `Self::Photon` does not include the comparison of its distance with the limit, which compares
-            // bits. `Self::TreePhoton` includes its comparison.
+            // The operations of `Self::Photon` do not include the comparison of its distance with the limit,
+            // which compares bits. Those of `Self::TreePhoton` include it.
             Self::Compared => counters.distances_compared + contents.photons,
             Self::Gather => counters.gathers - counters.tables + counters.caustic_gathers + counters.lookups,
             Self::Normal => counters.normals_decoded,
@@ -231,8 +230,8 @@ impl Step {
     }
 }
 
-/// Estimates the number of photons found by searches for direction tables, as if each found the mean number
-/// of all searches.
+/// Estimates the number of photons found by the searches for direction tables. Each such search is assumed to
+/// find as many photons as the mean of all searches.
 fn photons_of_tables(counters: &Counters) -> f64 {
     counters.photons_found as f64 * counters.tables as f64 / counters.gathers.max(1) as f64
 }

@@ -57,7 +57,8 @@ impl Shares {
 pub struct TimedChip {
     /// DRAM, arithmetic and tasks in flight.
     pub machine: Machine,
-    /// Number of entries of the queue of gathers: that of both halves together, at least 1.
+    /// Number of entries of the queue of gathers, at least 1. A queue of two halves has half of the entries
+    /// in each.
     pub queue: u64,
     /// Policy by which the queue is drained.
     pub policy: Policy,
@@ -93,7 +94,7 @@ impl FrameLoad {
     }
 
     /// Times of the frame on a chip that fetches lines of `line_bytes` bytes from DRAM. Only some drains are
-    /// simulated. Each further drain takes the mean time of the second half of these.
+    /// simulated. Each further drain takes the mean time of the second half of the simulated drains.
     pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
         // Number of pieces into which the work of the rays is divided. Each leads to at most one gather.
         let pieces = self.rays.tasks.max(self.gathers.tasks);

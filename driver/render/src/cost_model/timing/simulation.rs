@@ -9,9 +9,8 @@ use super::quantities::{FrameTimes, Load, UnitTimes};
 
 /// Number of ticks of the simulation per second.
 const TICKS: f64 = 1e14;
-/// Maximum number of simulated steps of a task. If a task has more, each simulated step has the arithmetic,
-/// bus time and latencies of several. The total times of its waits and of its use of each resource do not
-/// change.
+/// Maximum number of simulated steps of a task. If a task has more steps, each simulated step has the
+/// arithmetic, bus time and latencies of several steps, so that the task's total times do not change.
 const MAX_STEPS: f64 = 4.0;
 
 /// Sequence of integers with a given real mean, as even as possible.
@@ -41,7 +40,7 @@ impl Spread {
     }
 }
 
-/// Number and duration of the steps of the tasks of a unit; times in ticks.
+/// Steps of each task of a unit: their number, and their durations in ticks.
 #[derive(Clone, Copy)]
 pub(super) struct Task {
     /// Number of steps of a task.
@@ -112,7 +111,7 @@ impl Plan {
         if self.alternates() { self.queue } else { self.queue / 2 }
     }
 
-    /// Number of queue entries that rays may fill or reserve, while the queue is drained or not.
+    /// Number of queue entries that rays may fill or reserve. It is smaller while the queue is drained.
     fn room(&self, is_draining: bool) -> u64 {
         match (self.alternates(), is_draining) {
             (true, true) => 0,
@@ -177,7 +176,8 @@ impl UnitState {
         Self { task, busy: 0, reading: 0, computing: 0, memory_wait: 0, queue_wait: 0 }
     }
 
-    /// Counts a time span without events as a wait for memory or for the queue, if no task computes.
+    /// Adds the time span `time`, in which no event occurs, to the time of waiting for memory or for the
+    /// queue, if no task computes.
     fn pass(&mut self, time: u64, waits_for_queue: bool) {
         if self.computing > 0 {
             return;
@@ -204,7 +204,7 @@ struct Simulation<'a> {
     /// Events in the order of time, then in the order in which they were scheduled.
     events: BinaryHeap<Reverse<(u64, u64, Event)>>,
     foreseen: u64,
-    /// Arithmetic units of ray caster, gather unit and controller. If they share one, it is the first.
+    /// Arithmetic units of ray caster, gather unit and controller. If they share one unit, it is the first.
     arithmetic: [Server; 3],
     bus: Server,
     units: [UnitState; 2],
@@ -216,13 +216,14 @@ struct Simulation<'a> {
     casting: u64,
     /// Number of gathers in the half of the queue that is being filled.
     filling: u64,
-    /// Number of gathers in the drain that have not begun. `draining` counts those that have not ended.
+    /// Number of gathers of the current drain that have not begun. `draining` counts those that have not
+    /// ended.
     ready: u64,
     draining: u64,
     drain_time: u64,
 }
 
-/// Simulates `rays` rays and the gathers that they lead to. Returns their times.
+/// Simulates `rays` rays and the gathers that they lead to. Returns the times of the frame and its units.
 pub(super) fn run(plan: &Plan, rays: u64) -> FrameTimes {
     let mut simulation = Simulation::new(plan, rays);
     simulation.begin_tasks();

@@ -87,8 +87,8 @@ fn overlapped_units_take_the_longer_time_and_one_fill_or_drain_of_a_half() {
 
 #[test]
 fn a_queue_of_one_entry_is_serial() {
-    // Every second ray hits, with any number of tasks in flight: 2 rays of 100 + 2 + 3 ns, and a gather of 2
-    // steps of 100 + 2 + 7 ns.
+    // Every second ray hits. With any number of tasks in flight, 2 rays take 100 + 2 + 3 ns each, and a
+    // gather of 2 steps takes 100 + 2 + 7 ns a step.
     let both = frame(load(2e5, 1.0, 1.0, 300.0), load(1e5, 2.0, 1.0, 700.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         assert_near(

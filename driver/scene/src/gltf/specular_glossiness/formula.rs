@@ -30,8 +30,8 @@ fn brightness(colour: Vec3) -> f32 {
     libm::sqrtf(WEIGHTS.dot(colour * colour))
 }
 
-/// Metalness at which a base colour has this diffuse and specular brightness. `one_minus_strength` is 1 minus
-/// the greatest channel of the specular colour.
+/// Metalness of a metallic-roughness material whose diffuse and specular colours have these brightnesses.
+/// `one_minus_strength` is 1 minus the greatest channel of the specular colour.
 fn solve_metallic(diffuse: f32, specular: f32, one_minus_strength: f32) -> f32 {
     // At F0 itself, the most common value, rounding would decide whether dark texels are metal.
     if specular <= DIELECTRIC + EPSILON {

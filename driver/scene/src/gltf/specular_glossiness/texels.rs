@@ -6,7 +6,6 @@ use super::formula::Appearance;
 use super::{Conversion, Part};
 use crate::srgb::{Srgb, linear};
 
-/// Texels of an image with its size.
 #[derive(Clone, Copy)]
 pub(in crate::gltf) struct Grid<'t> {
     pub(in crate::gltf) size: [u32; 2],
@@ -14,7 +13,8 @@ pub(in crate::gltf) struct Grid<'t> {
 }
 
 impl Grid<'_> {
-    /// Linear value at the centre of texel (`x`, `y`) of a grid of size `size`, by bilinear interpolation.
+    /// Returns the linear value, bilinearly interpolated, at the centre of texel (`x`, `y`) of a grid of size
+    /// `size` over the same image.
     fn sample(&self, srgb: &Srgb, [x, y]: [u32; 2], size: [u32; 2]) -> Vec4 {
         let at = |x: u32, y: u32| srgb.decode(self.texels[(y * self.size[0] + x) as usize]);
         if self.size == size {

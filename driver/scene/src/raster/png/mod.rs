@@ -13,7 +13,7 @@ pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 /// texels of one bit.
 const TEXELS_OF_A_BYTE: u64 = 1032 * 8;
 
-/// Maximum memory of the decoder besides rows, bytes, such as for chunks of text and colour profiles.
+/// Maximum memory of the decoder, besides rows, for chunks such as text and colour profiles, bytes.
 const ANCILLARY_BYTES: usize = 16 << 20;
 
 /// Maximum size of a palette, bytes: 256 entries.
@@ -41,8 +41,8 @@ pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     Ok(([info.width, info.height], TEXELS_OF_A_BYTE * bytes.len() as u64))
 }
 
-/// Rejects a palette of other than 1 to 256 entries of three bytes, for which the decoder indexes out of
-/// bounds (image-rs/image-png issue 682).
+/// Checks that a palette has 1 to 256 entries of three bytes. With another palette the decoder would index
+/// out of bounds (image-rs/image-png issue 682).
 fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
     let palette = chunks(bytes).take_while(|(kind, _)| kind != b"IDAT").find(|(kind, _)| kind == b"PLTE");
     match palette {

@@ -6,8 +6,8 @@ use super::super::number;
 const INTERVALS: f64 = 10.0;
 /// Maximum number of tick labels of an axis.
 const MAX_TICKS: usize = 12;
-/// Maximum length of a logarithmic axis that may end at 1, 2 or 5 times a power of ten, counted in these
-/// steps. A longer axis ends at powers of ten.
+/// Maximum length of a logarithmic axis whose ends are at 1, 2 or 5 times a power of ten, counted in steps
+/// between such values. A longer axis ends at powers of ten.
 const MAX_STEPS: i32 = 9;
 /// A linear axis whose values are all below this magnitude extends from 0 to 1.
 const SMALLEST: f64 = 1e-290;
@@ -43,8 +43,8 @@ pub(super) struct Tick {
     pub(super) label: String,
 }
 
-/// A step `digit * 10^exponent`, where the digit is 1, 2 or 5. It is stored as `3 exponent` plus the index of
-/// the digit.
+/// The number `digit * 10^exponent`, where the digit is 1, 2 or 5. It is stored as `3 * exponent + i`, where
+/// `i` is the index of the digit.
 #[derive(Clone, Copy, Debug)]
 struct Step(i32);
 
@@ -129,7 +129,7 @@ impl Axis {
         self.place_of_measure(measure)
     }
 
-    /// Returns whether `value` is not below the lower end of the axis.
+    /// Returns whether `value` is at or above the lower end of the axis.
     pub(super) fn holds(&self, value: f64) -> bool {
         match self.kind {
             Kind::Log2 => value > 0.0 && value.log2() > self.low - WHOLE,
@@ -163,7 +163,7 @@ impl Axis {
         ticks
     }
 
-    /// Ticks to try after `sparsity` denser choices did not fit.
+    /// Ticks that `Self::ticks` tries after `sparsity` denser sets of ticks did not fit.
     fn candidate(&self, sparsity: i32) -> Vec<Tick> {
         match &self.kind {
             Kind::Linear { step } => self.linear_ticks(Step(step.0 + sparsity)),

@@ -7,9 +7,7 @@ use super::super::number;
 pub(crate) struct Panel {
     /// Title of the panel; may be empty.
     pub(crate) title: String,
-    /// Horizontal axis.
     pub(crate) x: XAxis,
-    /// Vertical axis.
     pub(crate) y: YAxis,
     pub(crate) series: Vec<Series>,
 }

@@ -7,7 +7,8 @@ use super::content::{Panel, Point, XScale, YScale};
 const LARGEST: f64 = 1e300;
 /// Minimum value that is drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// Least value to which an error bar extends a logarithmic axis, as a fraction of the value at its centre.
+/// Minimum of the lower ends of error bars that a logarithmic axis includes, divided by the value of the
+/// point.
 const BAR_SHARE: f64 = 0.1;
 
 /// Points of one series that can be drawn. A line joins the points of each run.

@@ -34,7 +34,6 @@ const PANEL_WIDTH: f64 = 390.0;
 /// panels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Plot {
-    /// Title of the figure.
     pub(crate) title: String,
     /// Caption that explains the figure; may be empty.
     pub(crate) caption: String,

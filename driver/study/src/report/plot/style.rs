@@ -26,9 +26,9 @@ const MARKERS: [(Shape, bool); 12] = [
     (Shape::Star, false),
 ];
 
-/// Colours of series. The CIE lightness (0 to 100) of any two differs by at least 4.9, that of any two of the
-/// first six by at least 10.9. The CIE76 difference of any two is above 20 for protanopes, deuteranopes and
-/// tritanopes too, whose vision is simulated after Machado et al. 2009.
+/// Colours of series. The CIE lightness (0 to 100) differs by at least 4.9 between any two colours, and by at
+/// least 10.9 between any two of the first six. The CIE76 difference of any two is above 20, also for
+/// protanopes, deuteranopes and tritanopes (vision simulated after Machado et al. 2009).
 const COLOURS: [&str; 12] = [
     "#000000", "#EB676C", "#4D1055", "#CAAE30", "#6C6DB6", "#873000", "#0046E1", "#7F5C71", "#507BEB",
     "#54079A", "#002900", "#76A8B0",

@@ -8,7 +8,7 @@ use super::text;
 pub(super) const FRAME: &str = "#777777";
 pub(super) const GRID: &str = "#dddddd";
 
-/// Part of a text that is at its position, as in SVG's `text-anchor`.
+/// Part of a text that lies at its given position: start, middle or end, as in SVG's `text-anchor`.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -56,7 +56,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// SVG of lines of text below each other. All are anchored at `x`; the first is below `top`.
+/// SVG of lines of text, one below the other. All are anchored at `x`, and the first line is below `top`.
 pub(super) fn lines(class: &str, lines: &[String], [x, top]: [f64; 2], size: f64, anchor: Anchor) -> String {
     let draw = |(index, line): (usize, &String)| {
         let y = top + text::height(index, size) + size;

@@ -133,9 +133,9 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Bytes of the photon map from DRAM at the first exponent minus those at the last. Both renders have the
-/// same tiles, so the estimate is of the difference of each tile (paired samples); the variance between tiles
-/// cancels.
+/// Bytes of the photon map fetched from DRAM at the first exponent, minus those at the last. Both renders
+/// have the same tiles. The estimate uses the difference of each tile (paired samples), so that the variance
+/// between tiles cancels.
 fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);

@@ -1,7 +1,7 @@
 //! Traffic of the lowest strip of the picture, which shows only the glossy floor.
 //!
-//! The traffic of the rest hardly depends on the floor's exponent, so that curves of the whole picture are
-//! flatter.
+//! The traffic of other parts of the picture hardly depends on the exponent of the floor. Curves of the whole
+//! picture are therefore flatter.
 
 use photoncard_picture::film::Window;
 

@@ -147,8 +147,8 @@ impl Swept<'_> {
     }
 
     /// Plot of the bytes of photon map and scene over the values of one axis, with a line for each
-    /// combination of the other axes' values. An axis that would make more than [`MAX_LINES`] lines keeps its
-    /// first value instead.
+    /// combination of the other axes' values. An axis with which the plot would have more than [`MAX_LINES`]
+    /// lines keeps its first value.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -210,8 +210,8 @@ impl Swept<'_> {
         series(name, points)
     }
 
-    /// Returns the indices of the other axes: first of those in which lines differ, then of those that keep
-    /// their first value.
+    /// Returns the indices of the axes other than `axis`, in two lists: axes whose values differ between the
+    /// lines of a plot, and axes that keep their first value.
     fn other_axes(&self, axis: usize) -> (Vec<usize>, Vec<usize>) {
         let (mut varied, mut kept, mut lines) = (Vec::new(), Vec::new(), 1);
         for (other, Axis { values, .. }) in

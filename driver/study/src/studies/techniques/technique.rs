@@ -18,8 +18,8 @@ pub(super) struct Technique {
     pub(super) radiance: Radiance,
     pub(super) layout: PhotonLayout,
     pub(super) tile: u32,
-    /// Chip on which all tiles are measured, several in flight; `None` to measure a sample of the tiles, one
-    /// at a time, on reference chips.
+    /// Chip that renders all tiles, several in flight, to measure the technique. `None` to measure a sample
+    /// of the tiles on reference chips, one at a time.
     pub(super) in_flight: Option<Setup>,
 }
 
@@ -128,9 +128,9 @@ impl Technique {
         self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
-    /// Numbers of gather rays at which the technique's error is measured, ascending. The range is narrower
-    /// for combined sampling by itself, which needs about as many rays as the naive render for the same
-    /// error. Interpolated or precomputed light may need fewer or more.
+    /// Numbers of gather rays at which the technique's error is measured, ascending. Combined sampling by
+    /// itself has a narrow range, because it needs about as many rays as the naive render for the same error.
+    /// Techniques with interpolated or precomputed light may need fewer or more rays.
     pub(super) fn sweep(&self, scale: &Scale) -> Vec<u32> {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];

@@ -27,9 +27,9 @@ impl AtQuality {
     }
 }
 
-/// Returns the number of gather rays at which the error first falls to `rmse`. Each element of `curve` is a
-/// number of rays and the error with it, in ascending order of rays. Between two elements, the logarithm of
-/// the error is linear in the logarithm of the rays. Returns `None` if `curve` is empty.
+/// Returns the number of gather rays at which the error first falls to `rmse`; `None` if `curve` is empty.
+/// Each element of `curve` is a number of rays and the corresponding error, in ascending order of rays.
+/// Between elements, the logarithm of the error is linear in the logarithm of the rays.
 fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     let &[rays, first] = curve.first()?;
     if first <= rmse {
@@ -45,9 +45,9 @@ fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     curve.last().map(|&[rays, _]| AtQuality::Missed(rays))
 }
 
-/// Returns the bytes at `rays` gather rays. Each element of `curve` is a number of rays and the bytes with
-/// it, in ascending order of rays. Between elements and beyond them, the logarithm of the bytes is linear in
-/// the logarithm of the rays.
+/// Returns the bytes read with `rays` gather rays. Each element of `curve` is a number of rays and the
+/// corresponding bytes, in ascending order of rays. Between elements and beyond them, the logarithm of the
+/// bytes is linear in the logarithm of the rays.
 fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
     let after = curve.iter().position(|(more, _)| *more >= rays).unwrap_or(curve.len());
     let after = after.clamp(1, curve.len().saturating_sub(1).max(1));
@@ -182,9 +182,9 @@ enum Verdict {
 }
 
 impl Verdict {
-    /// Creates the verdict on a technique that reaches the error with `at` rays and then reads `factor` times
-    /// fewer bytes than the other. With [`AtQuality::AtMost`] the factor is a lower bound, with
-    /// [`AtQuality::Missed`] an upper bound.
+    /// Creates the verdict on a technique that reaches the error with `at` rays. `factor` is the ratio of the
+    /// bytes of the other technique to those of this one. It is a lower bound with [`AtQuality::AtMost`], and
+    /// an upper bound with [`AtQuality::Missed`].
     fn new(at: AtQuality, factor: Ratio) -> Self {
         match at {
             AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
