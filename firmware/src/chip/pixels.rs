@@ -91,7 +91,8 @@ impl<K: ChipKind> Flight<K> {
         self.first_with_path(frame, first + self.position.index..first + stripe)
     }
 
-    /// Traces the current path of the next pixel with gather rays.
+    /// Traces one path from the eye: the path with the current number, of the stripe's next pixel that has
+    /// gather rays. Stores the gather point at its end, if that point has rays.
     pub(super) fn look<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,

@@ -77,8 +77,8 @@ const MAX_SHADING: f32 = 4.0;
 /// Maximum distance from the position to a box that a search visits, in cells of the photon grid. It allows
 /// for rounding at the borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Slope against the tangent plane that the direction to a photon may have because of the rounding of coded
-/// normals.
+/// Maximum slope, relative to the tangent plane, of the line from the position to a photon on the same flat
+/// surface. It is not zero because coded normals are rounded.
 const FLAT_SLOPE: f32 = 0.15;
 /// Divisor of a photon's factor `(1 - d^2 / h^2) / s` in the sums. Here `s` is the area of the photon's disc
 /// divided by the maximum area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`];

@@ -55,7 +55,8 @@ pub(super) fn points(scale: &Scale, lines: &[Line]) -> Vec<Point> {
     halves.chain(by_queue).collect()
 }
 
-/// Times of a line by policy, in the order of [`POLICIES`].
+/// Times of a frame with the gather order and photon map layout of `line`, one for each of [`POLICIES`]. The
+/// queue has `queue` entries; `None` stands for the chip's own number.
 fn times(scale: &Scale, results: &Results, line: Line, queue: Option<u32>) -> [FrameTimes; 3] {
     let frame = |point: &Point| TimedFrame::new(point, results.traffic(point), &scale.machine);
     let (whole, halves) = (frame(&point(scale, line, queue)), frame(&half(scale, line, queue)));

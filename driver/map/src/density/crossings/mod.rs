@@ -149,7 +149,8 @@ impl Crossings {
 struct Level {
     /// Sort keys; 0 for a chord with fewer than n crossings.
     keys: [u32; LANES],
-    /// `f32::to_bits` of the slopes `1 / cos`: surface area per area of the disc.
+    /// For each crossing, the bits (`f32::to_bits`) of the ratio of surface area to its projection on the
+    /// disc, `1 / cos`.
     slopes: [u32; LANES],
     faces: [u32; LANES],
     /// Bit mask of the crossings outside all solids.
