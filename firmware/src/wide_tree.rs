@@ -120,11 +120,12 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(outside)
     }
 
-    /// Ends the traversal of a group's tree, and restores the state of the traversal around it.
+    /// Ends the traversal of a group's tree, and restores the state of the traversal around it. Returns false
+    /// if the stack holds parts of the group yet.
     #[inline(always)]
-    pub(crate) fn end_group(&mut self, Outside { entries, visits_left }: Outside) {
-        self.stack.truncate(entries);
+    pub(crate) fn end_group(&mut self, Outside { entries, visits_left }: Outside) -> bool {
         self.visits_left = visits_left;
+        self.stack.len() == entries
     }
 
     /// Returns the next leaf or node whose distance is at most `limit`, given as `f32` bits; `None` at the

@@ -86,7 +86,7 @@ pub const MAX_BINS: u32 = 256;
 
 /// Number of stack entries for a traversal of the bounding volume hierarchy. The host refuses a hierarchy
 /// that needs more.
-pub const BVH_STACK: usize = 160;
+pub const BVH_STACK: usize = 256;
 
 /// Maximum depth of the photon kd-tree, in levels: 2^27 photons.
 pub const KD_TREE_LEVELS: usize = 27;

@@ -18,14 +18,22 @@ pub struct Instance {
 
 /// Minimum and maximum absolute determinant of a transform that can be inverted in single precision.
 const DETERMINANTS: [f64; 2] = [1e-18, 1e18];
+/// Maximum condition number of a transform, the product of its Frobenius norm and that of its inverse; 3 for
+/// rotations. The rounding errors of rays in a group's space are proportional to it.
+const MAX_CONDITION: f64 = 100.0;
 
 impl Instance {
-    /// Returns whether a transform mirrors; `None` if it cannot be inverted in single precision, so that no
-    /// instance can have it.
+    /// Returns whether a transform mirrors; `None` if its inverse is not exact enough in single precision, so
+    /// that no instance can have it.
     pub(crate) fn mirrors(to_world: &DMat4) -> Option<bool> {
         let [least, greatest] = DETERMINANTS;
-        let determinant = DMat3::from_mat4(*to_world).determinant();
-        (least..greatest).contains(&determinant.abs()).then_some(determinant < 0.0)
+        let linear = DMat3::from_mat4(*to_world);
+        let determinant = linear.determinant();
+        let norm =
+            |matrix: DMat3| matrix.to_cols_array().iter().map(|value| value * value).sum::<f64>().sqrt();
+        let is_exact = (least..greatest).contains(&determinant.abs())
+            && norm(linear) * norm(linear.inverse()) <= MAX_CONDITION;
+        is_exact.then_some(determinant < 0.0)
     }
 
     /// Creates an instance; `None` if the transform mirrors or cannot be inverted in single precision.

@@ -58,6 +58,18 @@ impl Scene {
         self.groups.iter().map(expands).collect()
     }
 
+    /// Number of triangles and instances that a card stores of [`Self::expanded`].
+    pub fn stored_if_expanded(&self, groups: &[bool]) -> usize {
+        let kept = self.groups.iter().zip(groups).filter(|(_, expands)| !**expands);
+        let of_instance = |instance: &Instance| {
+            let group = instance.group as usize;
+            if groups[group] { self.groups[group].len() } else { 1 }
+        };
+        self.triangles.len()
+            + kept.map(|(group, _)| group.len()).sum::<usize>()
+            + self.instances.iter().map(of_instance).sum::<usize>()
+    }
+
     /// Copy of the scene in which the instances of the chosen groups are triangles in world space.
     pub fn expanded(&self, groups: &[bool]) -> Self {
         self.clone().with(|scene| {
@@ -142,6 +154,10 @@ mod tests {
         assert!(Instance::new(0, &turned(1.0, 0.0)).is_none());
         assert!(Instance::new(0, &DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0))).is_none());
         assert!(Instance::new(0, &DMat4::from_scale(DVec3::splat(f64::NAN))).is_none());
+        let stretched =
+            |by: f64| turned(1.0, 1.0) * DMat4::from_scale(DVec3::new(1.0, by, 1.0)) * turned(2.0, 1.0);
+        assert!(Instance::new(0, &stretched(0.05)).is_some());
+        assert!(Instance::new(0, &stretched(1e-3)).is_none());
     }
 
     #[test]
@@ -155,6 +171,7 @@ mod tests {
         let expanded = lamp.expanded(&[true]);
         assert_eq!((expanded.triangles.len(), expanded.instances.len()), (3, 0));
         assert_eq!(lamp.placed_triangles(), 3);
+        assert_eq!([[true], [false]].map(|groups| lamp.stored_if_expanded(&groups)), [3, 4]);
         assert!((lamp.area() - expanded.area()).abs() < 1e-5 && (lamp.area() - 6.0).abs() < 1e-5);
         let [(lower, upper), (low, high)] = [lamp.bounds(), expanded.bounds()];
         // The box of a turned box contains the turned triangle.

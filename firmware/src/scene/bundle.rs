@@ -133,8 +133,8 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
             let others = 1..here.count_ones();
             match child {
                 Child::Leaf(END_OF_GROUP) => {
-                    rays.set_space(None, 0.0);
-                    leave(&mut group, &mut descent);
+                    rays.set_space(None);
+                    leave(&mut group, &mut descent)?;
                 }
                 _ if here == 0 => {}
                 Child::Node(node) => {
@@ -157,7 +157,7 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
                             waiting &= !rays.meet(isa, (scene, memory), ([leaf, instance], &line), here)?;
                         }
                         Some(instance) => {
-                            rays.set_space(Some(&instance), scene.header.reach);
+                            rays.set_space(Some(&instance));
                             enter(&mut group, (leaf, instance), &mut descent, here)?;
                         }
                     }
@@ -217,14 +217,13 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Prepares the rays for boxes in the space of an instance's group, or in world space. `reach` is the
-    /// greatest absolute coordinate of the scene.
+    /// Prepares the rays for boxes in the space of an instance's group, or in world space.
     #[cold]
     #[inline(never)]
-    fn set_space(&mut self, instance: Option<&Instance>, reach: f32) {
+    fn set_space(&mut self, instance: Option<&Instance>) {
         for way in &mut self.ways {
             way.slabs = match instance {
-                Some(instance) => Slabs::in_group(way.ray, instance, reach),
+                Some(instance) => Slabs::in_group(way.ray, instance),
                 None => Slabs::new(way.ray),
             };
         }

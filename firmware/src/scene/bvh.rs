@@ -240,7 +240,7 @@ fn descend<S: Search>(
             })?,
             Child::Leaf(END_OF_GROUP) => {
                 slabs = Slabs::new(ray);
-                leave(&mut group, &mut descent);
+                leave(&mut group, &mut descent)?;
             }
             Child::Leaf(leaf) => {
                 let line = descent.leaf(memory, leaf)?;
@@ -251,7 +251,7 @@ fn descend<S: Search>(
                 if sheared.may_meet == 0 {
                     // An instance looks like a leaf without triangles.
                     if let Some(instance) = Instance::read(line) {
-                        slabs = Slabs::in_group(ray, &instance, scene.header.reach);
+                        slabs = Slabs::in_group(ray, &instance);
                         enter(&mut group, (leaf, instance), &mut descent, 0)?;
                     }
                     continue;
@@ -298,12 +298,15 @@ pub(super) fn enter(
 }
 
 /// Leaves a group after its last leaf, and continues the traversal around the group.
+///
+/// # Errors
+/// [`FaultCode::Record`] if the card image has a leaf that the traversal takes for the end of a group.
 #[cold]
 #[inline(never)]
-pub(super) fn leave(group: &mut Option<Group>, descent: &mut Descent<STACK>) {
-    if let Some(Group { outside, .. }) = group.take() {
-        descent.end_group(outside);
-    }
+pub(super) fn leave(group: &mut Option<Group>, descent: &mut Descent<STACK>) -> Result<(), Fault> {
+    let fault = Fault { code: FaultCode::Record, detail: END_OF_GROUP };
+    let Group { outside, .. } = group.take().ok_or(fault)?;
+    if descent.end_group(outside) { Ok(()) } else { Err(fault) }
 }
 
 /// Returns the leaf `line` in world space, and the index of its instance. In a group, the moved leaf is in

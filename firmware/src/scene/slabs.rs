@@ -49,9 +49,8 @@ impl Slabs {
         Self { axes: [SlabAxis::new(a, x), SlabAxis::new(b, y), SlabAxis::new(c, z)] }
     }
 
-    /// Prepares a ray, in world space, for boxes in the space of an instance's group. `reach` is the greatest
-    /// absolute coordinate of the scene.
-    pub(super) fn in_group(ray: &Ray, instance: &Instance, reach: f32) -> Self {
+    /// Prepares a ray, in world space, for boxes in the space of an instance's group.
+    pub(super) fn in_group(ray: &Ray, instance: &Instance) -> Self {
         let rows = &instance.to_group;
         let [origin, direction] =
             [placed_point(rows, ray.origin.to_array()), placed_vector(rows, ray.direction.to_array())];
@@ -59,7 +58,7 @@ impl Slabs {
         // Upper bound of the distance at which the ray meets the instance. The rounding errors of the ray's
         // origin, of its direction over this distance, and of the triangles' vertices are proportional to the
         // terms of the sums that compute them.
-        let far = 2.0 * (reach + max_component(ray.origin.abs()));
+        let far = 2.0 * (instance.reach + max_component(ray.origin.abs()));
         for (axis, [a, b, c, d]) in slabs.axes.iter_mut().zip(rows) {
             let terms = (a.abs() + b.abs() + c.abs()) * (2.0 * far) + d.abs();
             axis.slack = MARGIN * terms * axis.inverse.abs();

@@ -11,7 +11,8 @@ use crate::address::LINE_BYTES;
 /// | 0..48 | transform from the group's space to the world: rows of four `f32` |
 /// | 48..96 | transform from the world to the group's space |
 /// | 96..100 | index of the root of the group's hierarchy |
-/// | 100..128 | 0 |
+/// | 100..104 | greatest absolute coordinate of the instance in the world, metres |
+/// | 104..128 | 0 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Transform from the group's space to the world.
@@ -20,6 +21,8 @@ pub struct Instance {
     pub to_group: Rows,
     /// Index of the root of the group's hierarchy, a [`BvhNode`](super::BvhNode).
     pub root: u32,
+    /// Greatest absolute coordinate of the instance in the world, metres.
+    pub reach: f32,
 }
 
 /// [`TriangleId::instance`] of a triangle that is not part of an instance.
@@ -42,6 +45,7 @@ impl TriangleId {
 }
 
 const ROOT: usize = 96;
+const REACH: usize = ROOT + 4;
 
 impl Instance {
     /// Reads the instance in a line of [`BvhLeaf`]s; `None` if the line is a leaf with triangles.
@@ -53,7 +57,7 @@ impl Instance {
         let [to_world, to_group] = [0, ROOT / 2].map(|first| {
             [0, 1, 2].map(|row| [0, 1, 2, 3].map(|column| read_f32(line, first + 16 * row + 4 * column)))
         });
-        Some(Self { to_world, to_group, root: read_u32(line, ROOT) })
+        Some(Self { to_world, to_group, root: read_u32(line, ROOT), reach: read_f32(line, REACH) })
     }
 
     /// Encodes the instance.
@@ -64,6 +68,7 @@ impl Instance {
             write_f32(&mut line, 4 * index, value);
         }
         write_u32(&mut line, ROOT, self.root);
+        write_f32(&mut line, REACH, self.reach);
         line
     }
 }
@@ -77,6 +82,7 @@ mod tests {
         to_world: [[2.0, 0.0, 0.0, 1.0], [0.0, 0.0, -2.0, 3.0], [0.0, 2.0, 0.0, -5.0]],
         to_group: [[0.5, 0.0, 0.0, -0.5], [0.0, 0.0, 0.5, 2.5], [0.0, -0.5, 0.0, 1.5]],
         root: 77,
+        reach: 9.5,
     };
 
     #[test]

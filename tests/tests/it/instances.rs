@@ -323,6 +323,25 @@ fn fault_with(change: impl Fn(&mut layout::Instance)) -> Option<FaultCode> {
 }
 
 #[test]
+fn deep_trees_of_a_scene_and_of_a_group_fit_the_stack_together() {
+    // Triangles on a spiral, each a fifth smaller than the last, have deep trees.
+    let spiral = |count: i32, material| {
+        let triangle = |index: i32| {
+            let size = 0.8_f32.powi(index % 120);
+            let place = Vec3::new(size, size * (index as f32).cos(), (index / 120) as f32 * 1e-3);
+            let corners = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|corner| place + corner * (0.1 * size));
+            Triangle::new(corners, material)
+        };
+        (0..count).map(triangle).collect::<Vec<_>>()
+    };
+    let scene = forest(matte()).with(|scene| {
+        scene.triangles.extend(spiral(60_000, GROUND));
+        scene.groups = vec![spiral(40_000, LEAF)];
+    });
+    PackedScene::new(&scene).expect("packs");
+}
+
+#[test]
 fn an_unsound_instance_is_a_fault() {
     assert_eq!(fault_with(|_| {}), None);
     // The root of the scene, whose leaves are instances: the group would contain itself.

@@ -137,13 +137,19 @@ pub fn build(content: Content, finishes: Finishes) -> Result<Hierarchy, Hierarch
     let mut folded: Vec<_> = parts.iter().map(|(mesh, boxes)| fold(mesh, boxes)).collect();
     if entries(&folded) > BVH_STACK {
         // A tree of median splits is slower to traverse, but has minimum depth.
-        folded = parts.iter().map(|(mesh, boxes)| fold_halves(mesh, boxes)).collect();
+        for (tree, (mesh, boxes)) in folded.iter_mut().zip(&parts) {
+            let halves = fold_halves(mesh, boxes);
+            if halves.stack < tree.stack {
+                *tree = halves;
+            }
+        }
     }
     let entries = entries(&folded);
     if entries > BVH_STACK {
         return Err(HierarchyError::TooDeep { entries });
     }
-    joined(folded, content, finishes)
+    let [(_, boxes), ..] = parts.as_slice() else { return Err(HierarchyError::NotFinite) };
+    joined(folded, content, &boxes[content.triangles.len()..], finishes)
 }
 
 /// Checks that a card can index this many triangles.
@@ -205,10 +211,12 @@ fn entries(folded: &[FoldedTree]) -> usize {
     scene.stack + of_groups.unwrap_or(0)
 }
 
-/// Encodes the hierarchy of a scene and, behind it, those of its groups.
+/// Encodes the hierarchy of a scene and, behind it, those of its groups. `around_instances` are the boxes
+/// around the instances.
 fn joined(
     folded: Vec<FoldedTree>,
     content: Content,
+    around_instances: &[Aabb],
     finishes: Finishes,
 ) -> Result<Hierarchy, HierarchyError> {
     let mut hierarchy = Hierarchy { nodes: Vec::new(), leaves: Vec::new(), leaf_triangles: Vec::new() };
@@ -226,7 +234,12 @@ fn joined(
             BvhNode::encode(&node.children, links)
         });
         hierarchy.nodes.extend(encoded.collect::<Option<Vec<_>>>().ok_or(HierarchyError::NotFinite)?);
-        let lines = leaves.par_iter().map(|indices| mesh.encode(indices).unwrap_or([0; LINE_BYTES]));
+        let lines = leaves.par_iter().map(|indices| match mesh.is_instance(indices) {
+            true => [0; LINE_BYTES],
+            false => {
+                mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
+            }
+        });
         hierarchy.leaves.par_extend(lines);
         let of_stored = |indices: LeafTriangles| -> LeafTriangles {
             let triangles = indices.into_iter().filter(|&index| (index as usize) < triangles.len());
@@ -243,7 +256,9 @@ fn joined(
     for (leaf, instance) in instances {
         let Instance { group, to_world, to_group } = content.instances[instance as usize];
         let root = roots[1 + group as usize];
-        hierarchy.leaves[leaf] = layout::Instance { to_world, to_group, root }.to_bytes();
+        let Aabb { min, max } = around_instances[instance as usize];
+        let reach = min.abs().max(max.abs()).max_element();
+        hierarchy.leaves[leaf] = layout::Instance { to_world, to_group, root, reach }.to_bytes();
     }
     Ok(hierarchy)
 }
@@ -315,13 +330,15 @@ impl Mesh<'_> {
 
     /// Returns whether the triangles or instances `indices` fit in one leaf.
     fn fits(&self, indices: &LeafTriangles) -> bool {
-        match indices.iter().any(|&index| index as usize >= self.triangles.len()) {
-            true => indices.len() == 1,
-            false => self.encode(indices).is_some(),
-        }
+        if self.is_instance(indices) { indices.len() == 1 } else { self.encode(indices).is_some() }
     }
 
-    /// Encodes a leaf with the triangles `indices`; `None` if they exceed one line or are instances.
+    /// Returns whether the leaf holds an instance.
+    fn is_instance(&self, indices: &[u32]) -> bool {
+        indices.iter().any(|&index| index as usize >= self.triangles.len())
+    }
+
+    /// Encodes a leaf with the triangles `indices`; `None` if they exceed one line.
     fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
         let records: heapless::Vec<_, LEAF_TRIANGLES> = indices
             .iter()

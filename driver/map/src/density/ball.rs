@@ -44,13 +44,14 @@ pub(super) struct NearTriangle {
 
 impl Ball {
     /// Returns a ball in the space of an instance's group that contains this ball, with a margin for
-    /// rounding. `reach` is the greatest absolute coordinate of the scene.
-    fn in_group(self, instance: &Instance, reach: f32) -> Self {
+    /// rounding.
+    fn in_group(self, instance: &Instance) -> Self {
         let rows = instance.to_group.map(|[a, b, c, _]| Vec3::new(a, b, c));
         // The Frobenius norm is at least the factor by which the transform stretches any vector.
         let stretch = rows.map(Vec3::length_squared).iter().sum::<f32>().sqrt();
         let centre = placed_point(&instance.to_group, self.centre.to_array()).into();
         let shift = instance.to_group.iter().map(|row| row[3].abs()).sum::<f32>();
+        let reach = instance.reach + self.centre.abs().max_element();
         let error = 16.0 * f32::EPSILON * (2.0 * stretch * reach + shift);
         Self { centre, radius: self.radius * stretch + error }
     }
@@ -146,8 +147,7 @@ fn for_each_below(
     stack: &mut Vec<Child>,
     visit: &mut impl FnMut(&NearTriangle) -> bool,
 ) -> Result<bool, Fault> {
-    let Ball { centre, radius } =
-        instance.map_or(ball, |(_, instance)| ball.in_group(instance, scene.header.reach));
+    let Ball { centre, radius } = instance.map_or(ball, |(_, instance)| ball.in_group(instance));
     let bottom = stack.len();
     stack.push(Child::Node(root));
     // In a sound tree each node and leaf is visited at most once; more visits mean a cycle.

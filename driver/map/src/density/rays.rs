@@ -40,12 +40,30 @@ pub(super) fn all_on_way(
     step: f32,
 ) -> Result<Vec<Met>, Fault> {
     let length = from.distance(to);
+    if length == 0.0 {
+        return Ok(Vec::new());
+    }
     let ray = Ray { origin: from, direction: (to - from) / length, max_distance: length };
-    let mut all = Vec::new();
-    for_each_hit(scene, &mut memory, &ray, |hit| all.push(Met::new(&hit)))?;
-    all.sort_unstable_by(|one, other| {
+    let (mut all, mut limit) = (Vec::new(), MANY_HITS);
+    for_each_hit(scene, &mut memory, &ray, |hit| {
+        all.push(Met::new(&hit));
+        if all.len() == limit {
+            thin(&mut all, step);
+            limit = MANY_HITS.max(2 * all.len());
+        }
+    })?;
+    thin(&mut all, step);
+    Ok(all)
+}
+
+/// Number of hits above which hits close to each other are removed before all are found: a file can have
+/// millions of coincident triangles.
+const MANY_HITS: usize = 4096;
+
+/// Sorts hits by distance, and keeps the first of those within `step` metres of each other.
+fn thin(hits: &mut Vec<Met>, step: f32) {
+    hits.sort_unstable_by(|one, other| {
         one.distance.total_cmp(&other.distance).then(one.triangle.cmp(&other.triangle))
     });
-    all.dedup_by(|next, kept| next.distance <= kept.distance + step);
-    Ok(all)
+    hits.dedup_by(|next, kept| next.distance <= kept.distance + step);
 }

@@ -58,8 +58,7 @@ impl PackedScene {
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         let groups = scene.expanded_groups();
         let expands = groups.contains(&true);
-        let stored = scene.stored_triangles().count() + scene.instances.len();
-        let triangles = if expands { scene.placed_triangles() as usize } else { stored };
+        let triangles = scene.stored_if_expanded(&groups);
         bvh::check_number(triangles)?;
         allocation::check(BYTES_OF_A_TRIANGLE * triangles as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles, bytes })?;

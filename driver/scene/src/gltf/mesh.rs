@@ -29,6 +29,8 @@ pub(super) struct MeshPlacer<'a> {
     placed: BTreeMap<usize, Copies>,
     /// Number of all counted copies.
     counted: u64,
+    /// Number of triangles, primitives and copies to be placed; those of a group count once.
+    work: u64,
     /// Meshes that are placed as instances of groups, each with the translation of its centre to the origin
     /// of the group's space.
     grouped: BTreeMap<usize, DMat4>,
@@ -83,6 +85,7 @@ impl<'a> MeshPlacer<'a> {
             prepared: BTreeMap::new(),
             placed: BTreeMap::new(),
             counted: 0,
+            work: 0,
             grouped: BTreeMap::new(),
             groups: BTreeMap::new(),
             not_finite: NotFinite::default(),
@@ -139,13 +142,12 @@ impl<'a> MeshPlacer<'a> {
 
     /// Checks that the triangles and instances of all counted meshes are at most [`MAX_TRIANGLES`] together,
     /// and that they fit into a card's memory.
-    pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
-        let work = self.placed.iter().fold(0_u64, |work, (mesh, copies)| {
-            let of_one = self.prepared.get(mesh).map_or(0, |primitives| triangles_and_primitives(primitives));
-            let copied = self.copies(*mesh, copies).saturating_mul(of_one);
+    pub(super) fn check_room(&mut self, room: &mut Room) -> Result<(), SceneError> {
+        self.work = self.placed.iter().fold(0_u64, |work, (mesh, copies)| {
+            let copied = self.copies(*mesh, copies).saturating_mul(self.of_one(*mesh));
             work.saturating_add(copied).saturating_add(copies.all())
         });
-        if work > MAX_TRIANGLES as u64 {
+        if self.work > MAX_TRIANGLES as u64 {
             return Err(self.too_many());
         }
         let of_groups = self.grouped.keys().filter_map(|mesh| self.placed.get(mesh));
@@ -164,6 +166,11 @@ impl<'a> MeshPlacer<'a> {
             bytes = bytes.saturating_add(once.saturating_mul(times));
         }
         room.triangles(triangles, bytes)
+    }
+
+    /// Number of triangles and primitives of a mesh.
+    fn of_one(&self, mesh: usize) -> u64 {
+        self.prepared.get(&mesh).map_or(0, |primitives| triangles_and_primitives(primitives))
     }
 
     /// Number of times that the triangles of a mesh are stored.
@@ -194,6 +201,14 @@ impl<'a> MeshPlacer<'a> {
     ) -> Result<(), SceneError> {
         match self.grouped.get(&index).copied() {
             Some(centred) if self.place_instance(index, centred, pose.world(), scene)? => Ok(()),
+            Some(_) if Instance::mirrors(&pose.world().matrix).is_some() => {
+                // This copy was counted as an instance.
+                self.work = self.work.saturating_add(self.of_one(index));
+                if self.work > MAX_TRIANGLES as u64 {
+                    return Err(self.too_many());
+                }
+                self.place_triangles(index, pose, scene)
+            }
             _ => self.place_triangles(index, pose, scene),
         }
     }

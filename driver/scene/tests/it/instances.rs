@@ -10,7 +10,7 @@ const TRIANGLES: u64 = 4096;
 const NODES: u64 = 65;
 
 /// Scene with `nodes` nodes, each with the same mesh of [`TRIANGLES`] coincident triangles that do not emit.
-fn mesh(nodes: u64, change: impl FnOnce(&mut Value)) -> Scene {
+fn file(nodes: u64, change: impl FnOnce(&mut Value)) -> Extended {
     let mut scene = Extended::new();
     let indices: Vec<u8> =
         [0_u16, 1, 2].repeat(TRIANGLES as usize).iter().flat_map(|i| i.to_le_bytes()).collect();
@@ -26,7 +26,11 @@ fn mesh(nodes: u64, change: impl FnOnce(&mut Value)) -> Scene {
         scene.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
     }
     change(&mut scene.json);
-    scene.load().unwrap()
+    scene
+}
+
+fn mesh(nodes: u64, change: impl FnOnce(&mut Value)) -> Scene {
+    file(nodes, change).load().unwrap()
 }
 
 /// Numbers of triangles in world space, of groups and of instances.
@@ -79,4 +83,17 @@ fn an_instance_changes_the_checksum_of_its_scene() {
     let scene = mesh(NODES, |_| {});
     let moved = scene.clone().with(|scene| scene.instances[3].to_world[0][3] += 0.5);
     assert_ne!(scene.checksum(), moved.checksum());
+}
+
+#[test]
+fn copies_that_cannot_be_instances_count_as_triangles() {
+    // A corner of each copy's box is further from the origin than a coordinate may be, but no vertex is.
+    let scene = file((1 << 24) / TRIANGLES + 1, |json| {
+        for node in json["nodes"].as_array_mut().unwrap() {
+            let turn = std::f64::consts::FRAC_PI_8.sin_cos();
+            *node = json!({"mesh": node["mesh"], "scale": [9.5e7, 9.5e7, 9.5e7], "rotation": [0, 0, turn.0, turn.1]});
+        }
+    });
+    let error = scene.load().unwrap_err().to_string();
+    assert!(error.contains("more than 16777216 triangles"), "{error}");
 }
