@@ -132,7 +132,7 @@ struct Sums<'a> {
     classes: u16,
     /// Sum of power times kernel factor, divided by [`FACTOR_UNIT`].
     power: ColourSum,
-    /// The same sum, with each term times [`PartialReflection::lobe_factor`].
+    /// Sum of power times kernel factor times [`PartialReflection::lobe_factor`], divided by [`FACTOR_UNIT`].
     of_lobe: ColourSum,
     photons: u32,
 }
