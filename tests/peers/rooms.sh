@@ -12,7 +12,8 @@
 # metals, as glTF has them. --map looks at the photon
 # map's estimate directly, --furnace at that in a room whose surfaces are white, under an even sky: it is 1, and
 # needs no reference. References are rendered once, in minutes each. ROOMS may name the folder of the rooms;
-# without it they are fetched. PNGs are left in target/peers/rooms: reference, picture, errors of blocks.
+# without it they are fetched. --skip-missing leaves out shapes whose files are absent. PNGs are left in
+# target/peers/rooms: reference, picture, errors of blocks.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
     echo "usage: $0 PHOTONCARD [--whole | --map | --furnace | --denoised] [NAME ..] [-- OPTION ..]" >&2
@@ -29,7 +30,7 @@ rooms=${ROOMS:-$target/peers/dppm-scenes/scenes}
     source=https://github.com/hchoi405/dppm-scenes
     git clone --quiet --depth 1 --filter=blob:none --sparse "$source" "$target/peers/dppm-scenes"
     git -C "$target/peers/dppm-scenes" sparse-checkout set \
-        scenes/{living-room{,-2},staircase,classroom,dining-room}
+        scenes/{living-room{,-2},staircase,classroom,dining-room,veach-lamp}
 }
 if [ "${1:-}" = --denoised ]; then
     shift

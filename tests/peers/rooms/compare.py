@@ -27,7 +27,7 @@ sys.path.insert(0, str(HERE.parent / "mitsuba"))
 import gltf  # noqa: E402: of the folder beside
 import plate  # noqa: E402
 
-NAMES = ("living-room", "staircase", "classroom", "dining-room", "living-room-2")
+NAMES = ("living-room", "staircase", "classroom", "dining-room", "living-room-2", "veach-lamp")
 FURNACES = ("living-room",)
 BLOCK, DARK, LONG = 12, 0.05, 192
 # Settings of a view of the map, whose samples have nothing to average but the lobe.
@@ -67,6 +67,7 @@ def parse():
     parser.add_argument("--map", action="store_true", help="see above")
     parser.add_argument("--furnace", action="store_true", help="see above")
     parser.add_argument("--whole", action="store_true", help="see above")
+    parser.add_argument("--skip-missing", action="store_true", help="leave out shapes whose files are absent")
     parser.add_argument("--seeds", type=int, help="pictures [default: 2, of a map 8]")
     parser.add_argument("--passes", type=int, default=16, help="of 128 samples of a reference, at most")
     arguments = parser.parse_args(words)
@@ -89,7 +90,11 @@ def convert(arguments, name):
     path = arguments.folder / kind(arguments) / f"{name}.glb"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        options = {"furnace": ["--lambertian", "--furnace", "--flat", "--no-glass"], "lambertian": ["--lambertian"], "whole": []}
+        options = {
+            "furnace": ["--lambertian", "--furnace", "--flat", "--no-glass"],
+            "lambertian": ["--lambertian"],
+            "whole": ["--black-backs"],
+        }
         run(
             [
                 sys.executable,
@@ -98,6 +103,7 @@ def convert(arguments, name):
                 "--output",
                 path,
                 *options[kind(arguments)],
+                *(["--skip-missing"] if arguments.skip_missing else []),
             ]
         )
     return path

@@ -49,6 +49,7 @@ def parse():
     parser.add_argument("--long", type=int, default=960, help="longer side of the pictures, pixels")
     parser.add_argument("--seconds", default="10,30,100", help="CPU seconds, with commas between them")
     parser.add_argument("--samples", type=int, default=2048, help="of Cycles's reference; photoncard's has an eighth, with 4 gather rays each")
+    parser.add_argument("--skip-missing", action="store_true", help="leave out shapes whose files are absent")
     arguments = parser.parse_args()
     arguments.whole, arguments.map, arguments.furnace = True, False, False
     arguments.times = [float(time) for time in arguments.seconds.split(",")]

@@ -110,6 +110,9 @@ class Scene:
         properties, to_world = self.properties(item), matrix(item)
         if "filename" in properties:
             name = Path(properties["filename"]).stem
+        if "shapeIndex" in properties:
+            # Such a file has many meshes.
+            name = identity(item) or f"{name} {properties['shapeIndex']:.0f}"
         if item.get("type") == "rectangle":
             positions, corners, normals, coordinates = RECTANGLE, QUAD, None, RECTANGLE_UV
         else:

@@ -1,7 +1,8 @@
 """Converts a room of Mitsuba's XML to a .glb, and beside it an .exr of its light from infinitely far, if any.
 
-Emission is radiometric. A `twosided` material is double-sided, others have one side. Bumps are left out,
-and shapes whose files are absent, which are named on the standard error.
+Emission is radiometric. A `twosided` material is double-sided, others have one side. Bumps are left out. A
+`ward` that reflects nothing diffusely is a metal. Files of shapes that are absent are named on the standard
+error, and end the conversion unless `--skip-missing` is given.
 """
 
 import argparse
@@ -22,6 +23,8 @@ GLASS = ("dielectric", "thindielectric", "roughdielectric")
 METALS = ("conductor", "roughconductor")
 # Reflectance of a metal as a Lambertian surface.
 GREY = 0.5
+# How far behind a lamp its black back is, over the diagonal of its bounding box.
+BEHIND = 1e-3
 MEDIA = {".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".png": "image/png"}
 
 
@@ -31,10 +34,14 @@ def main():
     scene = mitsuba_xml.Scene(arguments.scene)
     for name in scene.missing:
         print(f"{arguments.scene}: the file of {name} is absent", file=sys.stderr)
+    if scene.missing and not arguments.skip_missing:
+        sys.exit(f"{arguments.scene}: not converted; --skip-missing leaves out such shapes")
     writer = Writer()
     for shape in scene.shapes:
         if not is_left_out(shape, arguments):
             writer.add(shape, arguments)
+            if arguments.black_backs and shape.radiance is not None and not arguments.furnace:
+                writer.add(black_back(shape), arguments)
     writer.camera(scene.sensor)
     writer.write(arguments.output)
     picture = sky.bake(scene)
@@ -56,6 +63,12 @@ def parse():
         action="store_true",
         help="all but glass is white and diffuse: under an even sky every surface has its radiance",
     )
+    parser.add_argument(
+        "--black-backs",
+        action="store_true",
+        help="black surfaces close behind lamps: Blender's import has lamps shine to both sides",
+    )
+    parser.add_argument("--skip-missing", action="store_true", help="leave out shapes whose files are absent")
     parser.add_argument("--no-textures", action="store_true", help="the mean colour instead of textures")
     parser.add_argument(
         "--without", nargs="+", default=[], help="leave out materials or shapes of these names"
@@ -67,6 +80,21 @@ def is_left_out(shape, arguments):
     """Whether the options leave out a shape."""
     is_glass = shape.material.kind in GLASS
     return is_glass and arguments.no_glass or {shape.name, shape.material.name} & set(arguments.without)
+
+
+def black_back(shape):
+    """What is close behind a lamp, faces the other way, and reflects nothing."""
+    corners = shape.positions[shape.corners]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ways = np.zeros_like(shape.positions)
+    for corner in range(3):
+        np.add.at(ways, shape.corners[:, corner], normals)
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+    positions = shape.positions - BEHIND * np.linalg.norm(np.ptp(shape.positions, axis=0)) * ways
+    black = mitsuba_xml.Bsdf("black back", "diffuse", values={"reflectance": np.zeros(3)})
+    return mitsuba_xml.Shape(
+        f"{shape.name} back", positions, shape.corners[:, ::-1], None, None, black, None
+    )
 
 
 class Writer:
@@ -185,7 +213,7 @@ class Writer:
             return {"metallicFactor": 0.0, "baseColorFactor": [1.0] * 4}, {
                 "KHR_materials_specular": {"specularFactor": 0.0}
             }
-        if bsdf.kind in METALS:
+        if is_metal(bsdf):
             if arguments.lambertian:
                 return {"metallicFactor": 0.0, "baseColorFactor": [GREY] * 3 + [1.0]}, {
                     "KHR_materials_specular": {"specularFactor": 0.0}
@@ -256,14 +284,23 @@ def is_black(colour):
     return colour is not None and not np.any(colour)
 
 
+def is_metal(bsdf):
+    """Whether a material is a metal, such as a Ward lobe alone."""
+    lobe = bsdf.kind == "ward" and is_black(bsdf.values.get("diffuseReflectance"))
+    return lobe or bsdf.kind in METALS
+
+
 def ior(values):
     """The index of refraction."""
     return float(values.get("intIOR", 1.5)) / float(values.get("extIOR", 1.0))
 
 
 def roughness(bsdf):
-    """glTF's roughness: its square is alpha."""
-    return 0.0 if not bsdf.kind.startswith("rough") else math.sqrt(float(bsdf.values.get("alpha", 0.1)))
+    """glTF's roughness: its square is alpha, which Ward's lobe has in common with Beckmann's."""
+    if bsdf.kind != "ward" and not bsdf.kind.startswith("rough"):
+        return 0.0
+    alpha = float(bsdf.values.get("alpha", 0.1))
+    return math.sqrt(math.sqrt(bsdf.values.get("alphaU", alpha) * bsdf.values.get("alphaV", alpha)))
 
 
 def metal(bsdf):
