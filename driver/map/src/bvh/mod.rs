@@ -134,13 +134,13 @@ pub fn build(content: Content, finishes: Finishes) -> Result<Hierarchy, Hierarch
     let mesh = |triangles| Mesh { triangles, finishes };
     let parts = content.groups.iter().zip(&groups).map(|(group, boxes)| (mesh(group.as_slice()), boxes));
     let parts: Vec<_> = std::iter::once((mesh(content.triangles), &boxes)).chain(parts).collect();
-    let mut folded: Vec<_> = parts.iter().map(|(mesh, boxes)| fold(mesh, boxes)).collect();
+    let mut folded: Vec<_> = parts.iter().map(|(mesh, boxes)| FoldedTree::new(mesh, binary(boxes))).collect();
     if entries(&folded) > BVH_STACK {
         // A tree of median splits is slower to traverse, but has minimum depth.
         for (tree, (mesh, boxes)) in folded.iter_mut().zip(&parts) {
-            let halves = fold_halves(mesh, boxes);
-            if halves.stack < tree.stack {
-                *tree = halves;
+            let halved = FoldedTree::new(mesh, halved(boxes));
+            if halved.folded.stack < tree.folded.stack {
+                *tree = halved;
             }
         }
     }
@@ -187,19 +187,16 @@ fn around_instance(instance: &Instance, groups: &[Aabb]) -> Aabb {
     Aabb { min: (min - margin).into(), max: (max + margin).into() }
 }
 
-type FoldedTree = Folded<LeafTriangles, NodeBox>;
-
-/// Builds and folds the tree of the triangles and instances with these bounding boxes.
-fn fold(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
-    let parts = Parts::new(boxes);
-    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, boxes)).collect();
-    Folded::new(tree(&binary(&around_parts), &parts, boxes, mesh))
+/// A folded tree. Its leaves, and the bounds of children, are indices of nodes of the binary tree.
+struct FoldedTree {
+    folded: Folded<u32, u32>,
+    binary: Vec<Bvh2Node>,
 }
 
-/// Builds and folds the tree as [`fold`] does, but by median splits.
-fn fold_halves(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
-    let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
-    Folded::new(halves(&mut indices, boxes, mesh))
+impl FoldedTree {
+    fn new(mesh: &Mesh, binary: Vec<Bvh2Node>) -> Self {
+        Self { folded: Folded::new(tree(&binary, mesh)), binary }
+    }
 }
 
 /// Returns the maximum number of stack entries of a traversal. The first tree is the scene's. The others are
@@ -207,8 +204,8 @@ fn fold_halves(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
 fn entries(folded: &[FoldedTree]) -> usize {
     let [scene, groups @ ..] = folded else { return 0 };
     // A mark is pushed below the root of a group.
-    let of_groups = groups.iter().map(|group| group.stack + 1).max();
-    scene.stack + of_groups.unwrap_or(0)
+    let of_groups = groups.iter().map(|group| group.folded.stack + 1).max();
+    scene.folded.stack + of_groups.unwrap_or(0)
 }
 
 /// Encodes the hierarchy of a scene and, behind it, those of its groups. `around_instances` are the boxes
@@ -224,16 +221,25 @@ fn joined(
     // Leaves that hold an instance, each with its index.
     let mut instances: Vec<(usize, u32)> = Vec::new();
     let meshes = std::iter::once(content.triangles).chain(content.groups.iter().map(Vec::as_slice));
-    for (Folded { nodes, leaves, .. }, triangles) in folded.into_iter().zip(meshes) {
+    for (FoldedTree { folded: Folded { nodes, leaves, .. }, binary }, triangles) in
+        folded.into_iter().zip(meshes)
+    {
         let (first_node, first_leaf) = (hierarchy.nodes.len() as u32, hierarchy.leaves.len() as u32);
         roots.push(first_node);
         let mesh = &Mesh { triangles, finishes };
         let encoded = nodes.par_iter().map(|node| {
-            let Links { leaves, first_leaf: leaf, first_node: child } = node.links;
-            let links = Links { leaves, first_leaf: first_leaf + leaf, first_node: first_node + child };
-            BvhNode::encode(&node.children, links)
+            let Links { leaves: count, first_leaf: leaf, first_node: child } = node.links;
+            let links =
+                Links { leaves: count, first_leaf: first_leaf + leaf, first_node: first_node + child };
+            let children: Vec<_> =
+                node.children.iter().map(|&child| node_box(&binary[child as usize])).collect();
+            BvhNode::encode(&children, links)
         });
         hierarchy.nodes.extend(encoded.collect::<Option<Vec<_>>>().ok_or(HierarchyError::NotFinite)?);
+        let too_many = || unreachable!("the triangles below a leaf were counted");
+        let leaves: Vec<LeafTriangles> =
+            leaves.par_iter().map(|&leaf| below(&binary, leaf).unwrap_or_else(too_many)).collect();
+        drop(binary);
         let lines = leaves.par_iter().map(|indices| match mesh.is_instance(indices) {
             true => [0; LINE_BYTES],
             false => {
@@ -263,14 +269,34 @@ fn joined(
     Ok(hierarchy)
 }
 
-/// Builds a binary tree with one leaf per box. Leaves of several triangles are made when the tree is folded.
-fn binary(boxes: &[Aabb]) -> Bvh2 {
+/// Builds a binary tree with one leaf per box. A leaf's `first_index` is the index of its box. Leaves of
+/// several triangles are made when the tree is folded. Median splits divide the triangles that the builder
+/// received as one box.
+fn binary(boxes: &[Aabb]) -> Vec<Bvh2Node> {
+    let parts = Parts::new(boxes);
+    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, boxes)).collect();
     let (distance, precision) = (PlocSearchDistance::High, SortPrecision::U128);
-    let indices = (0..boxes.len() as u32).collect();
-    let mut tree =
-        PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, SEARCH_DEPTH);
+    let indices = (0..around_parts.len() as u32).collect();
+    let mut tree = PlocBuilder::with_capacity(around_parts.len()).build(
+        distance,
+        &around_parts,
+        indices,
+        precision,
+        SEARCH_DEPTH,
+    );
+    drop(around_parts);
     REINSERTED.iter().for_each(|&share| reinsertion::optimize(&mut tree, share));
-    tree
+    let Bvh2 { mut nodes, primitive_indices, .. } = tree;
+    for node in 0..nodes.len() {
+        if nodes[node].is_leaf() {
+            let part = primitive_indices[nodes[node].first_index as usize];
+            match parts.triangles(part) {
+                &[triangle] => nodes[node].first_index = triangle,
+                crowd => halve(&mut nodes, node, &mut crowd.to_vec(), boxes),
+            }
+        }
+    }
+    nodes
 }
 
 /// Input of the builder: one box for many triangles whose boxes have a common centre, and one box for each
@@ -348,69 +374,94 @@ impl Mesh<'_> {
     }
 }
 
-/// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf can become a leaf.
-fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
+/// Converts a binary tree for folding. Every subtree whose triangles fit in one leaf can become a leaf.
+fn tree(binary: &[Bvh2Node], mesh: &Mesh) -> Tree<u32, u32> {
     let missing = || unreachable!("a part is made before its parent");
-    let mut below = Vec::new();
-    for nodes in depths(binary).iter().rev() {
-        let mut below_nodes = below.into_iter();
-        let mut part = || below_nodes.next().unwrap_or_else(missing);
-        let with_parts = nodes.iter().map(|&node| (node, (!node.is_leaf()).then(|| [part(), part()])));
-        let with_parts: Vec<_> = with_parts.collect();
-        let trees = with_parts.into_par_iter().with_min_len(SEQUENTIAL).map(|(node, parts_below)| {
-            let Some(parts_below) = parts_below else {
-                // A leaf of the builder's tree holds one of its input boxes.
-                let part = binary.primitive_indices[node.first_index as usize];
-                return halves(&mut parts.triangles(part).to_vec(), boxes, mesh);
-            };
-            let bounds = node.aabb();
-            let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
-            let leaf = both(&parts_below, mesh).map(|leaf| (leaf, LEAF_COST * bounds.half_area()));
-            Tree::node(parts_below, NodeBox { lower, upper }, bounds.half_area(), leaf)
+    let mut pairs: Vec<[Tree<u32, u32>; 2]> = Vec::new();
+    for nodes in depths(binary).into_iter().rev() {
+        let inner: Vec<u32> =
+            nodes.iter().copied().filter(|&node| !binary[node as usize].is_leaf()).collect();
+        let inner = inner.into_par_iter().zip(pairs).with_min_len(SEQUENTIAL).map(|(node, parts)| {
+            let area = binary[node as usize].aabb().half_area();
+            let leaf = parts.iter().all(|part| part.as_leaf().is_some()) && fits(binary, node, mesh);
+            Tree::node(parts, node, area, leaf.then_some((node, LEAF_COST * area)))
         });
-        below = trees.collect();
+        let mut inner = inner.collect::<Vec<_>>().into_iter();
+        let mut trees = nodes.into_iter().map(|node| match binary[node as usize].is_leaf() {
+            true => Tree::leaf(node, node, LEAF_COST * binary[node as usize].aabb().half_area()),
+            false => inner.next().unwrap_or_else(missing),
+        });
+        if trees.len() == 1 {
+            return trees.next().unwrap_or_else(missing);
+        }
+        pairs = std::iter::from_fn(|| Some([trees.next()?, trees.next()?])).collect();
     }
-    below.pop().unwrap_or_else(missing)
+    missing()
 }
 
 /// Returns the nodes of each depth, from the root downwards. Nodes with one parent are adjacent.
-fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
+fn depths(binary: &[Bvh2Node]) -> Vec<Vec<u32>> {
     let mut depths = Vec::new();
-    let mut nodes = vec![&binary.nodes[0]];
+    let mut nodes = vec![0];
     while !nodes.is_empty() {
-        let inner = nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.first_index as usize);
-        let below = inner.flat_map(|first| [first, first + 1].map(|child| &binary.nodes[child])).collect();
+        let inner = nodes.iter().map(|&node| &binary[node as usize]).filter(|node| !node.is_leaf());
+        let below = inner.flat_map(|node| [node.first_index, node.first_index + 1]).collect();
         depths.push(std::mem::replace(&mut nodes, below));
     }
     depths
 }
 
-/// Builds a tree by median splits along the longest axis.
-fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
+/// Builds a binary tree of minimum depth over at least one box, by median splits.
+fn halved(boxes: &[Aabb]) -> Vec<Bvh2Node> {
+    let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
+    let mut nodes = vec![Bvh2Node::default()];
+    halve(&mut nodes, 0, &mut indices, boxes);
+    nodes
+}
+
+/// Makes the node `node` the root of a tree of the boxes `indices`, by median splits along the longest axis.
+fn halve(nodes: &mut Vec<Bvh2Node>, node: usize, indices: &mut [u32], boxes: &[Aabb]) {
     let bounds = around(indices, boxes);
-    let area = bounds.half_area();
-    let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
-    if let Ok(leaf) = LeafTriangles::from_slice(indices)
-        && mesh.fits(&leaf)
-    {
-        return Tree::leaf(leaf, node_box, LEAF_COST * area);
+    if let &mut [index] = indices {
+        nodes[node] = Bvh2Node::new(bounds, 1, index);
+        return;
     }
     let axis = bounds.diagonal().max_position();
     let (middle, center) = (indices.len() / 2, |index: u32| boxes[index as usize].center()[axis]);
     indices.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
+    let first = nodes.len();
+    nodes[node] = Bvh2Node::new(bounds, 0, first as u32);
+    nodes.resize(first + 2, Bvh2Node::default());
     let (below, above) = indices.split_at_mut(middle);
-    let parts = [below, above].map(|part| halves(part, boxes, mesh));
-    Tree::node(parts, node_box, area, None)
+    halve(nodes, first, below, boxes);
+    halve(nodes, first + 1, above, boxes);
 }
 
-/// Returns the triangles of two leaves together, or `None` if they do not fit in one leaf.
-fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
-    let mut indices = LeafTriangles::new();
-    for part in parts {
-        indices.extend_from_slice(part.as_leaf()?).ok()?;
+/// Returns whether the triangles below a node fit in one leaf.
+fn fits(binary: &[Bvh2Node], node: u32, mesh: &Mesh) -> bool {
+    below(binary, node).is_some_and(|indices| mesh.fits(&indices))
+}
+
+/// Returns the indices of the triangles or instances below a node, in order; `None` if they are more than a
+/// leaf can have.
+fn below(binary: &[Bvh2Node], node: u32) -> Option<LeafTriangles> {
+    fn add(binary: &[Bvh2Node], node: u32, indices: &mut LeafTriangles) -> Option<()> {
+        let Bvh2Node { first_index, .. } = binary[node as usize];
+        if binary[node as usize].is_leaf() {
+            return indices.push(first_index).ok();
+        }
+        add(binary, first_index, indices)?;
+        add(binary, first_index + 1, indices)
     }
+    let mut indices = LeafTriangles::new();
+    add(binary, node, &mut indices)?;
     indices.sort_unstable();
-    mesh.fits(&indices).then_some(indices)
+    Some(indices)
+}
+
+fn node_box(node: &Bvh2Node) -> NodeBox {
+    let Aabb { min, max } = node.aabb();
+    NodeBox { lower: min.to_array(), upper: max.to_array() }
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ use self::flat_glass::Glazing;
 pub(crate) use self::writer::ImageWriter;
 
 /// Memory that packing takes per triangle, bytes: mainly binary trees, without the scene itself.
-const BYTES_OF_A_TRIANGLE: u64 = 700;
+const BYTES_OF_A_TRIANGLE: u64 = 400;
 
 /// Card image of a scene before photons are added, and the sources of photons.
 #[derive(Clone)]
