@@ -126,13 +126,12 @@ impl Cards {
     }
 
     /// Gives the card image by reference to emulated cards with empty memory, instead of sending it over
-    /// their links. If the image is new, the first card is still loaded over its link, so that statistics
-    /// count one loading. With injected faults, all cards are loaded over their links.
-    fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
+    /// their links. Cards with a modelled memory, and all cards on links with injected faults, are loaded over
+    /// their links.
+    fn share(&mut self, image: &Arc<CardImage>, checksum: u64) {
         let is_faulty = self.set.faults.is_some();
-        for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
+        for (_, GreetedCard { card, session, .. }) in &mut self.cards {
             if let Some(memory) = card.take_empty_memory()
-                && (is_image_kept || index > 0)
                 && !is_faulty
             {
                 memory.give(image.clone(), Some(checksum));
@@ -283,13 +282,13 @@ impl Cards {
     /// If the trace cannot be written. All other errors are in [`Outcome::failure`], with an outcome that
     /// describes the work until then.
     pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
-        let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
+        let Work { settings, image, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared card image over their links store no copy of it.
         self.shared.give(image.clone(), None);
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };
-        self.share(image, job.upload.checksum(), is_image_kept);
+        self.share(image, job.upload.checksum());
         let scheduler = settings.scheduler(tiles, self.cards.len());
         let mut scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
         if frame.keep_records && frame.first_sample > 0 {

@@ -148,7 +148,6 @@ impl Renderer {
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
-        let is_image_kept = matches!(source, Source::Kept(_));
         let fit = &mut |check: BudgetCheck| cards.leave_out(check, needed, observer);
         let made = source.prepare(scene, settings, fit, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
@@ -160,16 +159,7 @@ impl Renderer {
         let film = Mutex::new(film);
         let sinks = outputs.sinks(&film);
         let image = &prepared.image;
-        let work = Work {
-            settings,
-            image,
-            is_image_kept,
-            frame: &frame,
-            tiles,
-            film: &film,
-            sinks,
-            outputs: &outputs,
-        };
+        let work = Work { settings, image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };
         let budgets = cards.budgets();
         let mut outcome = cards.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;

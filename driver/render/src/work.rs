@@ -29,8 +29,6 @@ pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError>
 pub(super) struct Work<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) image: &'a Arc<CardImage>,
-    /// True if the image is from an earlier picture or a prepared scene.
-    pub(super) is_image_kept: bool,
     pub(super) frame: &'a FrameParameters,
     /// All tiles of the picture.
     pub(super) tiles: Vec<Tile>,

@@ -43,7 +43,8 @@ fn walk() -> Value {
 #[test]
 fn a_moving_camera_takes_one_photon_pass_and_one_load() {
     let room = Room::new();
-    let options = ["--animation", "pan", "--frames", "3-6", "--card", "emulated:1"];
+    // On links with faults, cards do not take the image by reference.
+    let options = ["--animation", "pan", "--frames", "3-6", "--card", "emulated:1", "--faults", "seed=1"];
     moving(&room, &[&options[..], &["-o", "a.#.exr", "--stats", "a.##.json"]].concat());
     let first = statistics(&room, "a.03.json");
     assert!(sent(&first)[0] > 0, "{first}");
@@ -64,7 +65,8 @@ fn a_moving_camera_takes_one_photon_pass_and_one_load() {
 #[test]
 fn no_card_is_loaded_twice_for_cameras_that_move() {
     let room = Room::new();
-    let options = ["--animation", "pan", "--frames", "1-9", "--card", "emulated:3", "--tile", "2"];
+    let options = "--animation pan --frames 1-9 --card emulated:3 --tile 2 --faults seed=1";
+    let options: Vec<_> = options.split(' ').collect();
     moving(&room, &[&options[..], &["-o", "a.#.exr", "--stats", "a.#.json"]].concat());
     let frames: Vec<_> = (1..=9).map(|frame| statistics(&room, &format!("a.{frame}.json"))).collect();
     let image = frames[0]["image_bytes"].as_u64().expect("a number");
@@ -120,7 +122,7 @@ fn a_frame_of_a_walk_is_the_picture_from_the_cameras_place() {
 #[test]
 fn unchanged_lines_are_not_sent_again() {
     let room = Room::new();
-    let names = ["-o", "a.#.png", "--stats", "a.#.json", "--card", "emulated:1"];
+    let names = ["-o", "a.#.png", "--stats", "a.#.json", "--card", "emulated:1", "--faults", "seed=1"];
     moving(&room, &[&["--animation", "play", "--frames", "47,60,61"][..], &names].concat());
     // The animation ends at frame 48: frames 60 and 61 are equal.
     let bytes = ["a.47.json", "a.60.json", "a.61.json"].map(|name| sent(&statistics(&room, name)));
