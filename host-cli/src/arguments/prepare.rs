@@ -35,8 +35,7 @@ pub(crate) struct PrepareOptions {
     pub(crate) quality: Quality,
     /// Prepare for pictures that are denoised, by photoncard render --denoise or photoncard merge --denoise
     ///
-    /// With this option --quality chooses fewer samples and rays, 12 photons per gather, and no irradiance
-    /// cache.
+    /// With this option --quality chooses fewer samples and rays, and no irradiance cache.
     #[arg(long)]
     denoise: bool,
     #[command(flatten)]

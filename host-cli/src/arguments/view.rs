@@ -36,8 +36,7 @@ pub(crate) struct ViewOptions {
     pub(crate) quality: Quality,
     /// Denoise the settled picture by Open Image Denoise, as photoncard render --denoise does
     ///
-    /// With this option --quality chooses fewer samples and rays, 12 photons per gather, and no irradiance
-    /// cache.
+    /// With this option --quality chooses fewer samples and rays, and no irradiance cache.
     #[arg(long)]
     pub(crate) denoise: bool,
     #[command(flatten)]

@@ -210,7 +210,7 @@ const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
 const SECONDS_OF_COST: f64 = 6e-6;
 /// CPU seconds of a denoiser, plus `SECONDS_OF_DENOISED_PIXEL` for each pixel.
 const SECONDS_OF_DENOISER: f64 = 0.25;
-const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
+const SECONDS_OF_DENOISED_PIXEL: f64 = 12e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
 /// Maximum fraction of a picture's time that its first [`SAMPLES_IN_TIME`] samples and a denoiser take.

@@ -48,9 +48,6 @@ choices!(Quality {
 /// Number of photons that a gather searches for. Fewer photons blur less and take less time. With 24 photons,
 /// the noise of gather rays still exceeds that of photons.
 const NEIGHBORS: u32 = 24;
-/// Number of photons that a gather searches for in a denoised picture. Such a picture has fewer gather rays,
-/// and thus more noise of gather rays.
-const NEIGHBORS_OF_DENOISED: u32 = 12;
 
 /// Parameters of a quality whose settings depend on the scene: the worth of accuracy relative to time, and
 /// limits of the settings.
@@ -137,7 +134,7 @@ impl Quality {
             picture: Picture { filter: Filter::BlackmanHarris, ..Picture::default() },
             photons: PhotonMaps {
                 count: middle(*level.photons.start(), *level.photons.end()),
-                neighbors: if finish == Finish::Denoised { NEIGHBORS_OF_DENOISED } else { NEIGHBORS },
+                neighbors: NEIGHBORS,
                 caustic_photons: Some(level.caustic_photons),
                 ..PhotonMaps::default()
             },
