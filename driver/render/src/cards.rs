@@ -126,8 +126,8 @@ impl Cards {
     }
 
     /// Gives the card image by reference to emulated cards with empty memory, instead of sending it over
-    /// their links. Cards with a modelled memory, and all cards on links with injected faults, are loaded over
-    /// their links.
+    /// their links. Cards with a modelled memory, and all cards on links with injected faults, are loaded
+    /// over their links.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64) {
         let is_faulty = self.set.faults.is_some();
         for (_, GreetedCard { card, session, .. }) in &mut self.cards {
