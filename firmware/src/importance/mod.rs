@@ -10,9 +10,12 @@
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
 //! | reflection | the Lambertian albedo, all cells alike | the lobe's albedo |
-//! | photon (Jensen 1995, *Importance driven path tracing using the photon map*) | the flux of the photons that came through it | none |
-//! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | the same flux, multiplied by the reflection | the part of the lobe that is narrower than a cell |
+//! | photon | the flux of the photons that came through it | none |
+//! | product | the same flux, times the reflection | the part of the lobe narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
+//!
+//! *Photon* is from Jensen 1995, *Importance driven path tracing using the photon map*; *product* from
+//! Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*.
 //!
 //! Points with few rays use the table of the reflection with every sampling method
 //! ([`GatherPoint::choose_directions`](crate::render::GatherPoint::choose_directions)).

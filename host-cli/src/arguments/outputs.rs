@@ -39,8 +39,7 @@ pub(crate) struct OutputOptions {
     /// Remove noise by Open Image Denoise, a library that is looked for at run time
     ///
     /// The PNG shows the denoised picture. The EXR keeps the rendered one, and has the denoised one in the
-    /// layer denoised. With this option --quality chooses fewer samples and rays, and no irradiance
-    /// cache.
+    /// layer denoised. With this option --quality chooses fewer samples and rays, and no irradiance cache.
     #[arg(long)]
     pub(crate) denoise: bool,
     /// Show finished tiles during the render, in tev or another viewer that has tev's protocol [default port:
