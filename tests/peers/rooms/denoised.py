@@ -1,7 +1,7 @@
-"""Rooms that others made, with and without a denoiser: photoncard beside Blender's Cycles in equal CPU time.
+"""Rooms that others made, with and without a denoiser: photoncard beside Blender's Cycles and Mitsuba in equal CPU time.
 
-Of both the whole command is counted, on one thread: reading the scene, photons or hierarchy, samples, denoiser. Cycles has adaptive sampling and
-as many samples as fit the time by the cost of two short renders; photoncard has `--time`. Each is compared with a converged picture of its own, not
+The whole command is counted: reading the scene, photons or hierarchy, samples, denoiser. Cycles has adaptive sampling; it and Mitsuba have as many
+samples as fit the time by the cost of two short renders; photoncard has `--time`. Each is compared with a converged picture of its own, not
 denoised; the row `own` has what these differ by, which no time mends. Columns:
 
 - relMSE: mean of squared errors of channels over the reference's square plus 1e-4 of its mean square, without the worst 0.1 % of the pixels;
@@ -26,7 +26,7 @@ HEADS = ("room", "CPU s asked", "program", "CPU s", "relMSE", "FLIP", "mean", "m
 WORST = 0.001
 # Settings of photoncard's reference: many photons, and nothing that pixels share.
 OWN = "--photons 8000000 --gather-rays 4 --shadow-rays 2 --irradiance-cache off --adaptive off".split()
-# Samples of the renders that Cycles's cost is measured by.
+# Samples of the renders by which the cost of other programs is measured. Mitsuba compiles its kernels in the first of them.
 SHORT = (1, 5)
 
 
@@ -63,19 +63,30 @@ def race(arguments, scene):
     room = Room(arguments, scene, f"{width}x{height}")
     truths = room.references()
     show = room.folder / f"{scene.stem}.png"
-    row(scene, "", "own", 0.0, truths["photoncard"], truths["cycles"])
-    samples = room.samples_by_time()
+    for peer in ("cycles", "mitsuba"):
+        row(scene, "", f"own, by {peer}'s", 0.0, truths["photoncard"], truths[peer])
+    samples = {denoise: samples_by_time(lambda count, denoise=denoise: room.cycles(count, denoise)[1]) for denoise in (False, True)}
+    samples_of_mitsuba = samples_by_time(lambda count: room.mitsuba(count)[1])
     shown = [truths["cycles"]]
     for time in arguments.times:
+        picture, cpu = room.mitsuba(samples_of_mitsuba(time))
+        row(scene, time, "Mitsuba", cpu, picture, truths["mitsuba"])
         for denoise in (False, True):
             label = " + OIDN" if denoise else ""
-            picture, cpu = room.cycles(samples(time, denoise), denoise)
+            picture, cpu = room.cycles(samples[denoise](time), denoise)
             row(scene, time, f"Cycles{label}", cpu, picture, truths["cycles"])
             shown.append(picture)
             picture, cpu = room.photoncard(time, denoise)
             row(scene, time, f"photoncard{label}", cpu, picture, truths["photoncard"])
             shown.append(picture)
     compare.write_png(show, compare.shown_by(truths["cycles"], shown))
+
+
+def samples_by_time(cost):
+    """A function from CPU seconds to the number of samples that fit them, by the cost of two short renders."""
+    first, last = (cost(count) for count in SHORT)
+    of_sample = max((last - first) / (SHORT[1] - SHORT[0]), 1e-9)
+    return lambda time: max(1, round(1 + (time - first) / of_sample))
 
 
 class Room:
@@ -92,25 +103,16 @@ class Room:
         return self.folder / f"{self.scene.stem}-{name}.exr"
 
     def references(self):
-        """Converged pictures of both programs, rendered if they are missing."""
-        theirs, ours = self.path("cycles"), self.path("photoncard")
+        """Converged pictures of the programs, rendered if they are missing."""
+        theirs, mitsuba, ours = (self.path(name) for name in ("cycles", "mitsuba", "photoncard"))
         if not theirs.exists():
             self.run_cycles(theirs, self.arguments.samples, ["--reference", "--threads", 0, "--seed", 1000])
+        if not mitsuba.exists():
+            self.run_mitsuba(mitsuba, self.arguments.samples, seed=1000)
         if not ours.exists():
             spp = max(1, self.arguments.samples // 8)
             self.run_photoncard(ours, [*OWN, "--spp", spp, "--seed", 1000, "--aov", "none"])
-        return {"cycles": compare.read(theirs), "photoncard": compare.read(ours)}
-
-    def samples_by_time(self):
-        """The number of samples of Cycles that fit a time, with or without a denoiser."""
-        cost = {denoise: [self.cycles(count, denoise)[1] for count in SHORT] for denoise in (False, True)}
-
-        def samples(time, denoise):
-            first, last = cost[denoise]
-            of_sample = max((last - first) / (SHORT[1] - SHORT[0]), 1e-9)
-            return max(1, round(1 + (time - first) / of_sample))
-
-        return samples
+        return {"cycles": compare.read(theirs), "mitsuba": compare.read(mitsuba), "photoncard": compare.read(ours)}
 
     def cycles(self, samples, denoise):
         """Picture and CPU seconds of Cycles."""
@@ -122,8 +124,18 @@ class Room:
         """CPU seconds of Cycles."""
         command = [self.arguments.cycles, HERE.parent / "cycles" / "race.py", self.scene, output]
         command += ["--size", self.size, "--samples", samples, *self.environment, *options]
-        done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE)
-        return sum(json.loads(done.stdout.splitlines()[-1]).values())
+        return seconds_of(command)
+
+    def mitsuba(self, samples):
+        """Picture and CPU seconds of Mitsuba."""
+        output = self.path(f"mitsuba-{samples}")
+        cpu = self.run_mitsuba(output, samples, seed=1)
+        return compare.read(output), cpu
+
+    def run_mitsuba(self, output, samples, seed):
+        """CPU seconds of Mitsuba."""
+        command = [sys.executable, HERE.parent / "mitsuba" / "race.py", self.scene, output, "--size", self.size]
+        return seconds_of([*command, "--samples", samples, "--seed", seed, *self.environment])
 
     def photoncard(self, time, denoise):
         """Picture and CPU seconds of photoncard."""
@@ -139,6 +151,12 @@ class Room:
         compare.run([*command, *self.environment, *options])
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def seconds_of(command):
+    """The sum of the numbers in the last line that a command prints, a JSON object."""
+    done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE)
+    return sum(json.loads(done.stdout.splitlines()[-1]).values())
 
 
 def row(scene, time, program, cpu, picture, truth):
