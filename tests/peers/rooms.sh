@@ -5,8 +5,9 @@
 #   tests/peers/rooms.sh PHOTONCARD [--whole | --map | --furnace] [--seeds N] [NAME ..] [-- OPTION ..]
 #   tests/peers/rooms.sh PHOTONCARD --denoised [--long PIXELS] [--seconds S,..] [--samples N] [NAME ..]
 #
-# --denoised races photoncard, Blender's Cycles, both with and without Open Image Denoise, and Mitsuba in equal CPU time
-# (see rooms/denoised.py). References are rendered once, at 960x540 in hours; --long 320 --seconds 3,10 is short.
+# --denoised races photoncard and Blender's Cycles, each with and without Open Image Denoise, and Mitsuba in equal
+# CPU time (see rooms/denoised.py). References are rendered once, at 960x540 in hours; --long 320 --seconds 3,10
+# is short.
 #
 # All surfaces but glass are made Lambertian, so that both programs have the same; --whole keeps gloss and
 # metals, as glTF has them. --map looks at the photon

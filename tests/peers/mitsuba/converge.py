@@ -96,10 +96,15 @@ def choose_integrator(arguments):
     if arguments.caustics:
         mi.register_integrator("caustics", Caustics)
         return mi.load_dict({"type": "caustics"})
+    return path_tracer(arguments.scene, arguments.max_depth)
+
+
+def path_tracer(scene, max_depth):
+    """The integrator of a scene file's paths of at most that many segments; -1: no limit."""
     # Only the integrator of volumes lets light that is sampled at a lamp through holes in surfaces; the other finds it by
     # chance alone.
-    kind = "volpath" if scenes.has_holes(arguments.scene) else "path"
-    return mi.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": RUSSIAN_ROULETTE_DEPTH})
+    kind = "volpath" if scenes.has_holes(scene) else "path"
+    return mi.load_dict({"type": kind, "max_depth": max_depth, "rr_depth": RUSSIAN_ROULETTE_DEPTH})
 
 
 def has_converged(sums, arguments):

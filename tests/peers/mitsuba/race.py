@@ -15,7 +15,7 @@ import numpy as np
 mi.set_variant("llvm_ad_rgb")
 
 import scene as scenes  # noqa: E402: needs the variant
-from converge import RUSSIAN_ROULETTE_DEPTH  # noqa: E402: needs the variant
+from converge import path_tracer  # noqa: E402: needs the variant
 
 # Samples a pixel that are rendered at once: what memory has room for.
 PASS = 4
@@ -26,8 +26,7 @@ def main():
     arguments = parse()
     width, height = (int(side) for side in arguments.size.split("x"))
     scene = scenes.load(arguments.scene, width, height, None, arguments.environment)
-    kind = "volpath" if scenes.has_holes(arguments.scene) else "path"
-    integrator = mi.load_dict({"type": kind, "max_depth": -1, "rr_depth": RUSSIAN_ROULETTE_DEPTH})
+    integrator = path_tracer(arguments.scene, max_depth=-1)
     total = np.zeros((height, width, 3))
     for first in range(0, arguments.samples, PASS):
         samples = min(PASS, arguments.samples - first)
