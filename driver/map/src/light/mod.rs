@@ -194,6 +194,14 @@ impl SceneEmitter {
         (power > 0.0).then_some(Self { triangle: index, record, bounds, strongest })
     }
 
+    /// Radiance at the brightest texel, averaged over channels, W/(sr m^2); infinite without an area.
+    fn radiance(&self) -> f64 {
+        match self.record.kind {
+            EmitterKind::Triangle { .. } => mean(Vec3::from(self.record.emission)),
+            EmitterKind::Point { .. } | EmitterKind::Spot { .. } => f64::INFINITY,
+        }
+    }
+
     fn of_light(light: &PunctualLight) -> Option<Self> {
         let (position, kind, cone, solid_angle) = match light.kind {
             PunctualKind::Point { position } => {

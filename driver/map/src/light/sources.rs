@@ -55,6 +55,10 @@ pub(crate) struct Sources {
     /// is the probability of choosing the source. The unit of photon powers is derived from it. If a fraction
     /// of the photons is aimed, the other photons are stronger, and this maximum is greater.
     pub(crate) strongest: f32,
+    /// Mean radiance of the sources, weighted by their power, W/(sr m^2): the second moment of the radiance
+    /// that a ray finds at the sources, divided by the first. Infinite with lights without an area; 0 without
+    /// light.
+    pub(crate) radiance: f64,
 }
 
 /// A source chosen by [`Sources::choose`].
@@ -106,7 +110,8 @@ impl Sources {
         let mut all = AllSources::default();
         for (index, emitter) in (0..).zip(&lights.emitters) {
             let share = if is_aimed { aimed_share(&targets, &emitter.bounds.corners) } else { 1.0 };
-            all.add(Source::Emitter(index), emitter.bounds.power * share, emitter.strongest);
+            let radiance = emitter.radiance();
+            all.add(Source::Emitter(index), emitter.bounds.power * share, emitter.strongest, radiance);
         }
         let shown = |direction: DVec3| {
             if is_aimed { f64::from(targets.area()) } else { projected_area(size, direction) }
@@ -115,7 +120,12 @@ impl Sources {
             let [direction, irradiance] = [light.direction, light.irradiance].map(Vec3::from);
             let area = shown(direction.as_dvec3());
             let strongest = f64::from(irradiance.max_element()) * area;
-            all.add(Source::Distant { direction, irradiance }, mean(irradiance) * area, strongest);
+            all.add(
+                Source::Distant { direction, irradiance },
+                mean(irradiance) * area,
+                strongest,
+                f64::INFINITY,
+            );
         }
         all.add_cells(lights, shown, is_aimed.then_some(f64::from(targets.area())), size);
         let thresholds = thresholds(&all.powers);
@@ -126,6 +136,7 @@ impl Sources {
         Self {
             strongest: strongest.filter(|watts| watts.is_finite()).fold(0.0, f32::max),
             power: if is_aimed { 0.0 } else { all.powers.iter().sum() },
+            radiance: all.mean_radiance(),
             list: all.list,
             thresholds,
             bounds,
@@ -177,13 +188,24 @@ struct AllSources {
     list: Vec<Source>,
     powers: Vec<f64>,
     strongest: Vec<f64>,
+    /// Radiance of each source, W/(sr m^2), averaged over channels; infinite without an area.
+    radiances: Vec<f64>,
 }
 
 impl AllSources {
-    fn add(&mut self, source: Source, power: f64, strongest: f64) {
+    fn add(&mut self, source: Source, power: f64, strongest: f64, radiance: f64) {
         self.list.push(source);
         self.powers.push(power);
         self.strongest.push(strongest);
+        self.radiances.push(radiance);
+    }
+
+    /// Mean of the radiances, weighted by the powers; 0 without power.
+    fn mean_radiance(&self) -> f64 {
+        let lit = self.powers.iter().zip(&self.radiances).filter(|(power, _)| **power > 0.0);
+        let (sum, power) =
+            lit.fold((0.0, 0.0), |(sum, all), (power, radiance)| (sum + power * radiance, all + power));
+        if power > 0.0 { sum / power } else { 0.0 }
     }
 
     /// Adds the cells of the environment. `shown(direction)` is the area, m^2, through which a cell's light
@@ -215,7 +237,7 @@ impl AllSources {
                     solid_angle: solid_angle as f32,
                 };
                 let strongest = f64::from(map.brightest) * solid_angle * all_sides;
-                self.add(source, weight * area, strongest);
+                self.add(source, weight * area, strongest, weight / solid_angle);
             }
         }
     }
@@ -243,7 +265,8 @@ impl AllSources {
                 cosines: [upper as f32, (upper + height) as f32],
                 solid_angle: solid_angle as f32,
             };
-            self.add(source, weight * shown(middle.as_dvec3()), brightest * solid_angle * all_sides);
+            let strongest = brightest * solid_angle * all_sides;
+            self.add(source, weight * shown(middle.as_dvec3()), strongest, weight / solid_angle);
         }
     }
 }
@@ -251,7 +274,36 @@ impl AllSources {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use photoncard_scene::{Environment, PunctualKind, PunctualLight, SceneContents};
+    use photoncard_scene::{Environment, Material, PunctualKind, PunctualLight, SceneContents, Triangle};
+
+    /// A lamp of radiance 3 W/(sr m^2) and area 1/2 m^2, with the other contents.
+    fn lamp(others: SceneContents) -> Sources {
+        let lamp = Material { emission: Vec3::splat(3.0), ..Material::lambertian("lamp", Vec3::ZERO) };
+        let triangles = vec![Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0)];
+        let scene = Scene::from(SceneContents { triangles, materials: vec![lamp], ..others });
+        Sources::new(&scene, &Lights::new(&scene), None)
+    }
+
+    #[test]
+    fn the_mean_radiance_is_weighted_by_power_and_infinite_with_a_light_without_an_area() {
+        assert_eq!(lamp(SceneContents::default()).radiance, 3.0);
+        let light = PunctualLight {
+            name: "dim".into(),
+            kind: PunctualKind::Point { position: Vec3::ZERO },
+            intensity: Vec3::splat(1e-3),
+        };
+        assert_eq!(
+            lamp(SceneContents { lights: vec![light], ..SceneContents::default() }).radiance,
+            f64::INFINITY
+        );
+        let environment = Some(Environment::constant(Vec3::splat(1.0)));
+        let both = lamp(SceneContents { environment, ..SceneContents::default() });
+        let of_lamp = 3.0 * 0.5 * std::f64::consts::PI / both.power;
+        assert!((both.radiance - (3.0 * of_lamp + 1.0 - of_lamp)).abs() < 1e-5, "{}", both.radiance);
+        assert!((0.1..0.9).contains(&of_lamp));
+        let dark = Scene::default();
+        assert_eq!(Sources::new(&dark, &Lights::new(&dark), None).radiance, 0.0);
+    }
 
     #[test]
     fn sources_are_chosen_in_proportion_to_their_power() {

@@ -131,6 +131,16 @@ impl PackedScene {
         self.caustic_sources.as_ref()
     }
 
+    /// Mean radiance of the lights whose caustics the scene can show, weighted by their power towards its
+    /// specular surfaces, W/(sr m^2). Infinite with point, spot and distant lights, which no gather ray can
+    /// hit; 0 without specular surfaces.
+    pub fn radiance_of_caustics(&self) -> f64 {
+        if self.has_lobes_under_punctual_lights {
+            return f64::INFINITY;
+        }
+        self.caustic_sources.as_ref().map_or(0.0, |sources| sources.radiance)
+    }
+
     /// Returns whether any surface stores photons.
     pub(crate) fn keeps_photons(&self) -> bool {
         self.keeps_photons

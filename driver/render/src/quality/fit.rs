@@ -19,7 +19,7 @@ pub struct Fit {
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
-    /// Maximum number of photons in the caustic map.
+    /// Maximum number of photons in the caustic map; 0 if gather rays carry the light of caustics.
     pub max_caustic_photons: usize,
     /// Cameras for which photons are traced: any, or the picture's; never [`PhotonsFor::Auto`].
     pub photons_for: PhotonsFor,
@@ -143,6 +143,8 @@ pub struct Measured {
     /// Number of gather rays cast per pixel, divided by the setting `gather_rays`. It includes the rays of
     /// irradiance records and of samples without interpolation.
     pub gather_rays_per_ray: f64,
+    /// Number of paths from the lights per stored photon.
+    pub paths_of_photon: f64,
 }
 
 impl Measured {
@@ -170,8 +172,15 @@ const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
 const COST_OF_SHADOW_RAY: f64 = 0.4;
 /// Cost of a gather ray and the photon gather at its end, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_GATHER_RAY: f64 = 1.2;
-/// Cost of tracing and storing a photon, in the unit of [`COST_OF_SHADOW_RAY`].
+/// Cost of tracing and storing a photon whose path stores at least one, in the unit of
+/// [`COST_OF_SHADOW_RAY`].
 const COST_OF_PHOTON: f64 = 2.5;
+/// Cost of each further path that a photon takes, in the same unit.
+const COST_OF_PATH: f64 = 0.3;
+/// Maximum mean radiance of the lights whose caustics can be seen, divided by the median radiance of the
+/// picture, at which gather rays carry caustics and there is no caustic map. A gather ray that finds such a
+/// light at the end of a specular path changes its pixel by few times the pixel's radiance.
+const MAX_RADIANCE_OF_CAUSTICS: f64 = 16.0;
 /// Minimum and maximum of the adaptive threshold, as multiples of the cost model's threshold.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
 /// Minimum of [`Variances::gather_rays_per_ray`] in the computation of costs. The measured value may be too
@@ -209,7 +218,7 @@ const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
 /// CPU seconds per unit of cost ([`COST_OF_SHADOW_RAY`]), as measured in furnished rooms.
 const SECONDS_OF_COST: f64 = 6e-6;
 /// CPU seconds of a denoiser, plus `SECONDS_OF_DENOISED_PIXEL` for each pixel.
-const SECONDS_OF_DENOISER: f64 = 0.25;
+const SECONDS_OF_DENOISER: f64 = 0.05;
 const SECONDS_OF_DENOISED_PIXEL: f64 = 12e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
@@ -261,8 +270,10 @@ impl Fit {
     /// the time allows. If it allows too few and the number of gather rays is not stated, nothing is
     /// interpolated. Each sample then has the gather rays that the time allows, at least one.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
-        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
-        let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
+        let paths = self.measured.paths_of_photon;
+        let relative_cost = cost_of_photon(paths) / COST_OF_PHOTON;
+        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds / relative_cost;
+        let most = rounded(most, &(by_paths(MIN_PHOTONS_IN_TIME, paths)..=MAX_PHOTONS));
         let photons = self.photons.min(most);
         let shadow_rays = if stated.shadow_rays { integrator.shadow_rays } else { self.shadow_rays };
         let cost_of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(shadow_rays);
@@ -278,7 +289,7 @@ impl Fit {
         let of_samples = of_sample.saturating_mul(self.samples);
         Self {
             photons,
-            max_caustic_photons: most / PHOTONS_OF_CAUSTIC_PHOTON,
+            max_caustic_photons: self.max_caustic_photons.min(most / PHOTONS_OF_CAUSTIC_PHOTON),
             interpolates,
             gather_rays: if interpolates { of_record } else { self.gather_rays.min(of_samples) },
             beyond: Beyond {
@@ -364,6 +375,7 @@ impl Quality {
         let of = Pictured {
             pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
             triangles: scene.stored_triangles().count(),
+            radiance_of_caustics: packed.radiance_of_caustics(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
         let is_short = time_limit.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);
@@ -376,6 +388,8 @@ impl Quality {
 struct Pictured {
     pixels: f64,
     triangles: usize,
+    /// As [`PackedScene::radiance_of_caustics`].
+    radiance_of_caustics: f64,
     /// True if the irradiance cache may be used.
     is_cached: bool,
 }
@@ -392,6 +406,7 @@ impl Level {
             gather_ray,
             lambertian,
             gather_rays_per_ray,
+            paths_of_photon,
             level,
             photon: of_scene,
             for_camera,
@@ -408,13 +423,15 @@ impl Level {
         let cost = COST_OF_GATHER_RAY * gather_rays_per_ray.max(MIN_GATHER_RAYS_PER_RAY);
         let gather_rays = number(weight * gather_ray, cost);
         let weight_of_map = if gaining.is_some() { WEIGHT_OF_GUIDED_MAP } else { WEIGHT_OF_MAP };
-        let photons = number(weight_of_map * photon, COST_OF_PHOTON / of.pixels);
+        let photons = number(weight_of_map * photon, cost_of_photon(paths_of_photon) / of.pixels);
         let for_triangles = of.triangles.saturating_mul(PHOTONS_OF_TRIANGLE).min(MOST_FOR_TRIANGLES);
         let [fewest, most] = [*self.photons.start(), *self.photons.end()];
+        let fewest = by_paths(fewest.max(for_triangles).min(most), paths_of_photon);
+        let is_dim = of.radiance_of_caustics <= MAX_RADIANCE_OF_CAUSTICS * level;
         Fit {
             samples,
-            photons: rounded(photons, &(fewest.max(for_triangles).min(most)..=most)),
-            max_caustic_photons: usize::MAX,
+            photons: rounded(photons, &(fewest..=most)),
+            max_caustic_photons: if is_dim { 0 } else { usize::MAX },
             photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             beyond: Beyond {
@@ -435,9 +452,22 @@ impl Level {
                 million_photons: (photon / 1e6).sqrt(),
                 photons_for_camera: for_camera.map(|maps| maps.ratio).filter(|ratio| ratio.is_finite()),
                 gather_rays_per_ray,
+                paths_of_photon,
             },
         }
     }
+}
+
+/// Cost of tracing and storing a photon that takes this number of paths, in the unit of
+/// [`COST_OF_SHADOW_RAY`].
+fn cost_of_photon(paths: f64) -> f64 {
+    COST_OF_PHOTON + COST_OF_PATH * (paths - 1.0).max(0.0)
+}
+
+/// Number of photons that are stored by as many paths as `photons` take in a room, where each path stores at
+/// least one.
+fn by_paths(photons: usize, paths_of_photon: f64) -> usize {
+    (photons as f64 / paths_of_photon.max(1.0)) as usize
 }
 
 /// Rounds `number` up to a multiple of `step`, and clamps it to the bounds. Returns the maximum for NaN.
@@ -475,11 +505,13 @@ mod tests {
         photon: 3.0,
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
+        paths_of_photon: 0.3,
         for_camera: None,
         level: 4.0,
         deviations: Deviations::NONE,
     };
-    const PICTURED: Pictured = Pictured { pixels: 65_536.0, triangles: 32, is_cached: true };
+    const PICTURED: Pictured =
+        Pictured { pixels: 65_536.0, triangles: 32, radiance_of_caustics: f64::INFINITY, is_cached: true };
 
     fn good(variances: &Variances) -> Fit {
         Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
@@ -547,6 +579,37 @@ mod tests {
         assert_eq!(photons(Quality::Good, 100_000), 800_000);
         assert_eq!(photons(Quality::Good, usize::MAX), MOST_FOR_TRIANGLES);
         assert_eq!(photons(Quality::Draft, 100_000), 400_000);
+    }
+
+    #[test]
+    fn photons_that_take_many_paths_are_fewer() {
+        let by = |photon, paths_of_photon| good(&Variances { photon, paths_of_photon, ..VARIANCES });
+        assert_eq!([0.5, 1.0, 10.0].map(|paths| by(0.0, paths).photons), [200_000, 200_000, 20_000]);
+        let [in_room, of_object] = [1.0, 10.0].map(|paths| by(VARIANCES.photon, paths));
+        assert!(in_room.photons > of_object.photons && of_object.photons > in_room.photons / 2);
+        let [in_room, of_object] = [in_room, of_object].map(|fit| {
+            let time = TimeOfPicture { cpu_seconds: 5.0, pixels: 64.0, finish: Finish::Rendered };
+            fit.for_time(time, &Quality::Good.settings().integrator, Stated::default())
+        });
+        assert!((45..=52).contains(&(100 * of_object.photons / in_room.photons)), "{of_object:?}");
+    }
+
+    #[test]
+    fn caustics_of_dim_lights_need_no_map() {
+        let by = |radiance_of_caustics: f64, stated| {
+            let of = Pictured { radiance_of_caustics, ..PICTURED };
+            let fit = Quality::Good.level(Finish::Rendered).unwrap().fit(&VARIANCES, &of);
+            let settings = Quality::Good.settings().with(|settings| fit.apply(settings, stated));
+            settings.photons.caustic_photons
+        };
+        let open = Stated::default();
+        let limit = MAX_RADIANCE_OF_CAUSTICS * VARIANCES.level;
+        let own = Quality::Good.settings().photons.caustic_photons;
+        assert_eq!(
+            [0.0, limit, 1.01 * limit, f64::INFINITY].map(|radiance| by(radiance, open)),
+            [Some(0), Some(0), own, own]
+        );
+        assert_eq!(by(0.0, Stated { caustic_photons: true, ..open }), own);
     }
 
     #[test]

@@ -68,13 +68,13 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Parameters for a picture that is denoised: half the worth of accuracy, half the samples, an eighth of
-    /// the gather rays of a pixel, and no interpolation.
+    /// Parameters for a picture that is denoised: half the worth of accuracy, half of the fewest samples, an
+    /// eighth of the gather rays of a pixel, and no interpolation.
     fn denoised(self) -> Self {
         let share = |range: RangeInclusive<u32>, divisor| range.start() / divisor..=range.end() / divisor;
         Self {
             worth: 0.5 * self.worth,
-            samples: share(self.samples, 2),
+            samples: self.samples.start() / 2..=*self.samples.end(),
             gather_rays: share(self.gather_rays, 8),
             irradiance_error: None,
             ..self

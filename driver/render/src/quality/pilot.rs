@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::PackedScene;
+use photoncard_map::photon;
 use photoncard_map::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
 use photoncard_picture::film::Window;
 use photoncard_picture::sums::SumFormat;
@@ -38,6 +39,10 @@ const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.25;
 const ERROR_BY_USED_SHARE: f64 = 2.0;
 /// Ratio of the numbers of photons of the pilot's larger and smaller map.
 const MORE: usize = 4;
+/// Number of photons whose paths are counted before the pilot.
+const PROBED_PHOTONS: usize = 1024;
+/// Maximum divisor of the pilot's numbers of photons, where a photon takes many paths.
+const MAX_FEWER: f64 = 4.0;
 /// Seeds of the two renders of a pair. They and `PHOTON_SEED` differ from the picture's seed, on which the
 /// chosen settings must not depend.
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
@@ -65,6 +70,12 @@ impl Effort {
     /// short time limits. The chosen settings are less certain. Eight gather rays are the minimum, because
     /// gather points with fewer are sampled in another way.
     pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24], measures_guided: false };
+
+    /// Effort with fewer photons if each of them takes more than one path.
+    fn by(self, paths_of_photon: f64) -> Self {
+        let fewer = self.few_photons as f64 / paths_of_photon.clamp(1.0, MAX_FEWER);
+        Self { few_photons: fewer as usize, ..self }
+    }
 }
 
 /// Variances and errors from which the settings follow, relative to the squared radiance of the pixels.
@@ -87,6 +98,8 @@ pub(super) struct Variances {
     /// Number of gather rays cast per pixel, divided by the setting `gather_rays`. It includes the rays of
     /// irradiance records and of samples without interpolation.
     pub(super) gather_rays_per_ray: f64,
+    /// Number of paths from the lights per stored photon.
+    pub(super) paths_of_photon: f64,
     /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
     /// Noise of the direct light of each pixel, measured from two pilot renders with equal settings, which
@@ -133,6 +146,8 @@ pub(super) fn measure(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Variances, RenderError> {
+    let paths_of_photon = paths_of_photon(packed, observer)?;
+    let effort = effort.by(paths_of_photon);
     let Effort { few_photons, gather_rays: numbers_of_gather_rays, measures_guided } = effort;
     let more_photons = MORE * few_photons;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
@@ -155,7 +170,10 @@ pub(super) fn measure(
     // Each pilot has its own card image, so only one pilot exists at a time.
     let few = pilot(settings, few_photons)?;
     let by_few_photons = render_map(&few)?;
-    let gather_rays_per_ray = few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?;
+    let gather_rays_per_ray = match settings.integrator.irradiance_error {
+        Some(_) => few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
+        None => by_few_photons.share_seen(),
+    };
     drop(few);
     let more = pilot(settings, more_photons)?;
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
@@ -201,9 +219,17 @@ pub(super) fn measure(
         for_camera,
         lambertian: best[0].lambertian,
         gather_rays_per_ray,
+        paths_of_photon,
         level: level_of(&best),
         deviations: deviations(&best),
     })
+}
+
+/// Number of paths from the lights per stored photon. Few paths store photons where most light leaves the
+/// scene, as around a single object.
+fn paths_of_photon(packed: &PackedScene, observer: &dyn Observer) -> Result<f64, RenderError> {
+    let pass = photon::trace(packed, PHOTON_SEED, PROBED_PHOTONS, &|_| !observer.is_stopped())?;
+    Ok(pass.paths as f64 / pass.photons.len().max(1) as f64)
 }
 
 /// Variance `v` of a sample caused by one ray. The variance with `n` rays is `a + v / n`, where positions of
@@ -367,6 +393,12 @@ impl Pixels {
         let seen = is_seen.iter().filter(|is_seen| **is_seen).count();
         let lambertian: u64 = tiles.iter().map(|tile| tile.counters.lambertian_samples).sum();
         Self { direct, indirect, is_seen, lambertian: lambertian as f64 / seen.max(1) as f64 }
+    }
+
+    /// Fraction of the pixels whose sample casts gather rays; 0 without pixels.
+    fn share_seen(&self) -> f64 {
+        let seen = self.is_seen.iter().filter(|is_seen| **is_seen).count();
+        seen as f64 / self.is_seen.len().max(1) as f64
     }
 
     fn radiance(&self, pixel: usize) -> f64 {
