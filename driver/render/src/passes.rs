@@ -106,7 +106,10 @@ impl Renderer {
             settings.integrator.samples += more;
             let begun = Instant::now();
             match self.refine(scene, &settings, before.clone(), observer) {
-                Ok(rendering) => passes.rendering = rendering,
+                Ok(mut rendering) => {
+                    rendering.statistics.time_s += passes.rendering.statistics.time_s;
+                    passes.rendering = rendering;
+                }
                 Err(error) => {
                     passes.ending = Ending::Failed(error);
                     break;

@@ -53,7 +53,7 @@ pub struct Statistics {
     /// Number of tiles rendered again because their card was outvoted or sent wrong messages. The other
     /// counts include such a tile once.
     pub revoked_tiles: usize,
-    /// Time of each phase, seconds.
+    /// Time of each phase, seconds, over all passes. The counts are of the last pass.
     pub time_s: Times,
     /// Number of rays cast on the chips.
     pub rays: Rays,

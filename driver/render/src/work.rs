@@ -1,5 +1,6 @@
 //! Work of cards on a picture: the preparation of the card image, the outcome, and the time of each phase.
 
+use std::ops::AddAssign;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -143,4 +144,27 @@ pub struct Times {
     pub denoise: f64,
     /// Total time.
     pub total: f64,
+}
+
+impl AddAssign for Times {
+    fn add_assign(&mut self, more: Self) {
+        let Self { scene, pilot, photons, pack, hierarchy, photon_map, .. } = more;
+        let Self { discs, irradiance, load, render, denoise, total, .. } = more;
+        for (time, more) in [
+            (&mut self.scene, scene),
+            (&mut self.pilot, pilot),
+            (&mut self.photons, photons),
+            (&mut self.pack, pack),
+            (&mut self.hierarchy, hierarchy),
+            (&mut self.photon_map, photon_map),
+            (&mut self.discs, discs),
+            (&mut self.irradiance, irradiance),
+            (&mut self.load, load),
+            (&mut self.render, render),
+            (&mut self.denoise, denoise),
+            (&mut self.total, total),
+        ] {
+            *time += more;
+        }
+    }
 }

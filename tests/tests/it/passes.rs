@@ -256,6 +256,8 @@ fn passes_until_an_aim_equal_a_render_of_their_samples() {
         let Ok(passes) = passes else { panic!("no passes") };
         assert!(matches!(passes.ending, Ending::Reached), "{:?}", passes.ending);
         let samples = passes.rendering.film.format().samples;
+        let times = passes.rendering.statistics.time_s;
+        assert!(times.photons > 0.0 && times.pack > 0.0, "{times:?} of {} passes", passes.count);
         let at_once =
             settings.with(|s| (s.integrator.samples, s.integrator.planned_samples) = (samples, Some(4)));
         let expected = render_or_panic(&everything(), &at_once).film;

@@ -30,9 +30,9 @@ const SURVEYED: Grid = Grid { cells: 4, side: 32 };
 const MAX_USED_SHARE: f64 = 0.3;
 /// Range of the fraction of an unguided map's photons that the picture uses, in which the short pilot
 /// estimates the error of a guided map instead of measuring it. Below it the picture uses less than a hundred
-/// of the pilot's photons; above it guiding may gain nothing. In rooms with fractions of 0.11 and 0.15 the
-/// measured ratios of the squared errors are 0.40 and 0.21, the estimated ones 0.22 and 0.30.
-const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.25;
+/// of the pilot's photons. In rooms with fractions of 0.11 and 0.15 the measured ratios of the squared errors
+/// are 0.40 and 0.21, the estimated ones 0.22 and 0.30.
+const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=MAX_USED_SHARE;
 /// Factor `c` in the estimate `c f E` of the squared error of a guided map. `E` is the squared error of an
 /// unguided map, and `f` the fraction of its photons that the picture uses. `c` is above 1, because guided
 /// photons differ in power.
