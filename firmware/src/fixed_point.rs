@@ -115,6 +115,18 @@ impl ColourSum {
         }
     }
 
+    /// Words of the sum, the low one of each channel first.
+    pub(crate) fn words(&self) -> [u32; 6] {
+        let [[a, b], [c, d], [e, f]] = self.bits().map(|bits| [bits as u32, (bits >> 32) as u32]);
+        [a, b, c, d, e, f]
+    }
+
+    /// Sum of these words.
+    pub(crate) fn of_words([a, b, c, d, e, f]: [u32; 6]) -> Self {
+        let bits = |[low, high]: [u32; 2]| (u64::from(high) << 32 | u64::from(low)).cast_signed();
+        Self([[a, b], [c, d], [e, f]].map(|words| Sum(I24F40::from_bits(bits(words)))))
+    }
+
     /// Value of each channel, in steps of 2^-40 units.
     #[inline(always)]
     pub fn bits(&self) -> [i64; 3] {

@@ -45,6 +45,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("gather rays     {} a sample", budget.gather_rays),
         format!("bins            {MAX_BINS} of directions"),
         format!("gather queue    {} gathers", budget.gather_queue),
+        format!("waiting         {} blocks of tiles in card memory", budget.waiting_blocks),
         format!("records         {} of irradiance a tile in flight", budget.irradiance_records),
         format!("shadow rays     {} a sample", budget.shadow_rays),
         format!("samples         {} a pixel", budget.samples),

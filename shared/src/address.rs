@@ -66,10 +66,12 @@ pub enum Structure {
     /// Records of the irradiance cache that a chip keeps from one frame to the next, in the lines after the
     /// card image.
     IrradianceRecords = 13,
+    /// Gathers that wait in the lines after the card image, their results, and the blocks that wait for them.
+    Waiting = 14,
 }
 
 /// Number of structures.
-pub const STRUCTURES: usize = 14;
+pub const STRUCTURES: usize = 15;
 
 impl Structure {
     /// All structures, in order.
@@ -88,10 +90,15 @@ impl Structure {
         Self::Attributes,
         Self::Textures,
         Self::IrradianceRecords,
+        Self::Waiting,
     ];
 
-    /// Returns true for the photon map, the caustic map and the irradiance points, false for structures of
-    /// the scene.
+    /// Returns true for structures of the scene, and for kept irradiance records.
+    pub const fn is_scene(self) -> bool {
+        !self.is_photon_map() && !matches!(self, Self::Waiting)
+    }
+
+    /// Returns true for the photon map, the caustic map and the irradiance points.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
         matches!(

@@ -41,6 +41,10 @@ pub struct Budget {
     /// Maximum number of tiles in flight. A tile is in flight until its last gather is done, so several tiles
     /// can wait for gathers at once.
     pub in_flight: u32,
+    /// Maximum number of blocks whose gathers wait in card memory at once
+    /// ([`Drain::Buckets`](crate::message::Drain::Buckets)), and of tiles that a chip then holds. A chip with
+    /// none cannot render such frames.
+    pub waiting_blocks: u32,
 }
 
 /// Number of sums per pixel in a picture with layers: direct light, indirect light, caustics, and a count of
@@ -57,6 +61,30 @@ impl Budget {
     pub const fn pixels_of_tile(&self, layers: bool) -> u32 {
         self.tile_pixels / sums_of_pixel(layers)
     }
+}
+
+/// Upper limit of [`Budget::waiting_blocks`] for all kinds of chips.
+pub const MAX_WAITING_BLOCKS: u32 = 64;
+
+/// Upper limit of [`Budget::tile_pixels`] and of [`Budget::irradiance_records`] of a chip with
+/// [`Budget::waiting_blocks`].
+pub const MAX_WAITING_POINTS: u32 = 1 << 12;
+
+/// Number of waiting gathers in a line of card memory.
+pub const GATHERS_PER_LINE: usize = 5;
+
+/// Maximum number of buckets of gathers in card memory.
+pub const MAX_BUCKETS: usize = 2048;
+
+/// Number of buckets of gathers in card memory: the greatest power of two, at most [`MAX_BUCKETS`], for which
+/// a queue of `queue` gathers has room for a line of each bucket; 0 if there is none.
+pub const fn gather_buckets(queue: u32) -> usize {
+    let lines = queue as usize / GATHERS_PER_LINE;
+    if lines == 0 {
+        return 0;
+    }
+    let buckets = 1 << lines.ilog2();
+    if buckets < MAX_BUCKETS { buckets } else { MAX_BUCKETS }
 }
 
 /// Upper limit of [`Budget::in_flight`] for all kinds of chips.

@@ -25,6 +25,7 @@ const BUDGET: Budget = Budget {
     samples: 4097,
     tiles: 4,
     in_flight: 2,
+    waiting_blocks: 32,
 };
 
 const HEADER: FrameHeader =
@@ -260,10 +261,11 @@ fn structures_have_their_golden_bytes() {
         samples: 12,
         tiles: 13,
         in_flight: 300,
+        waiting_blocks: 15,
     };
     let hello =
         Reply::Hello { protocol: 6, layout: 5, budget, written_lines: 14, memory_use: None, build: "x" };
-    let bytes = [0, 6, 5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0xac, 2, 14, 0, 1, b'x'];
+    let bytes = [0, 6, 5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0xac, 2, 15, 14, 0, 1, b'x'];
     assert_eq!(encoded(&hello), bytes);
 
     let one = 1.0_f32.to_le_bytes();

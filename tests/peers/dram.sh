@@ -17,7 +17,7 @@ line_bytes=128
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 folder=$target/peers/dramsim3
 sources=$folder/sources
-orders=(naive tiled dirbin hash sort)
+orders=(naive tiled dirbin hash sort buckets)
 
 fail() {
     echo "$0: $*" >&2
@@ -55,7 +55,7 @@ measure() {
     "$photoncard" render "$scene" "${options[@]}" --order "$order" --card emulated:1 --counters --stats "$files/stats.json" \
         --trace "$files/trace.gz" --trace-format dramsim3 -o "$files/out.exr" --quiet
     row=$(gzip -dc "$files/trace.gz" | "$folder/replay" "$configuration" "$files" "$in_flight")
-    fetched=$(jq '.memory.photon_map.dram_bytes + .memory.scene.dram_bytes' "$files/stats.json")
+    fetched=$(jq '.memory | .photon_map.dram_bytes + .scene.dram_bytes + .waiting.dram_bytes + .tile_written_bytes' "$files/stats.json")
     lines=${row%% *}
     [ $((lines * line_bytes)) = "$fetched" ] || fail "$order: $lines lines were replayed, but $fetched bytes were counted"
     awk -v order="$order" -v bytes="$fetched" '{

@@ -86,6 +86,7 @@ choices!(Structure {
     Attributes = "attributes": "Vertex attributes",
     Textures = "textures": "Texture records and texels",
     IrradianceRecords = "irradiance_records": "Irradiance records kept from an earlier frame",
+    Waiting = "waiting": "Gathers that wait in card memory, their results, and blocks that wait for these",
 });
 
 choices!(Stage {

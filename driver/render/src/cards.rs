@@ -8,7 +8,7 @@ use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use photoncard_cards::dispatcher::Dispatcher;
-use photoncard_cards::scheduler::{CardNumber, Scheduler, Standing, near, spread};
+use photoncard_cards::scheduler::{CardNumber, GatherOrder, Scheduler, Standing, near, spread};
 use photoncard_cards::session::{Job, PixelLimits, Upload};
 use photoncard_map::pack::CardImage;
 use photoncard_picture::sink::TileSink;
@@ -364,16 +364,19 @@ impl RenderSettings {
     /// Creates the scheduler of the tiles for `cards` cards. If memory is modelled, no tile is rendered
     /// twice, because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
+        let is_in_shares = self.schedule.order == GatherOrder::Buckets;
         // The counts of modelled caches depend on the order of the tiles, so the order of the picture is
         // kept.
         if self.modelled_caches().is_some() {
-            return Scheduler::new(tiles, cards);
+            let scheduler = Scheduler::new(tiles, cards);
+            return if is_in_shares { scheduler.in_shares() } else { scheduler };
         }
         let ordered = match self.schedule.focus {
             Some(focus) => near(tiles, focus),
             None => spread(tiles),
         };
         let scheduler = Scheduler::new(ordered, cards).with_helpers();
+        let scheduler = if is_in_shares { scheduler.in_shares() } else { scheduler };
         match self.cards.verify {
             Some(share) => scheduler.verifying(share, self.integrator.seed),
             None => scheduler,

@@ -15,12 +15,16 @@ pub struct MemoryStatistics {
     pub photon_map: ReadStatistics,
     /// Reads of the scene.
     pub scene: ReadStatistics,
+    /// Reads of what waits in card memory: gathers, their results, and blocks.
+    pub waiting: ReadStatistics,
     /// Reads by kind of data structure in card memory.
     pub structures: StructureReads,
     /// Reads by stage of the chip's work.
     pub stages: StageReads,
-    /// Bytes written into card memory: card images and kept irradiance records.
+    /// Bytes written into card memory: card images, and those of `tile_written_bytes`.
     pub written_bytes: u64,
+    /// Bytes written for tiles: kept irradiance records, and gathers, results and blocks that wait.
+    pub tile_written_bytes: u64,
 }
 
 /// Reads of a part of card memory.
@@ -65,6 +69,8 @@ pub struct StructureReads {
     pub attributes: ReadStatistics,
     /// Reads of textures and their texels.
     pub textures: ReadStatistics,
+    /// Reads of gathers, results and blocks that wait in card memory.
+    pub waiting: ReadStatistics,
 }
 
 /// Reads by stage of the chip's work.
@@ -95,7 +101,8 @@ impl MemoryStatistics {
         Self {
             caches: caches.to_string(),
             photon_map: of(Structure::is_photon_map),
-            scene: of(|structure| !structure.is_photon_map()),
+            scene: of(Structure::is_scene),
+            waiting: structure(Structure::Waiting),
             structures: StructureReads {
                 nodes: structure(Structure::Nodes),
                 triangles: structure(Structure::Triangles),
@@ -109,6 +116,7 @@ impl MemoryStatistics {
                 caustic_photons: structure(Structure::CausticPhotons),
                 attributes: structure(Structure::Attributes),
                 textures: structure(Structure::Textures),
+                waiting: structure(Structure::Waiting),
             },
             stages: StageReads {
                 eye: stage(Stage::Eye),
@@ -119,7 +127,8 @@ impl MemoryStatistics {
                 gather: stage(Stage::Gather),
                 caustic: stage(Stage::Caustic),
             },
-            written_bytes: traffic.requested.written_bytes,
+            written_bytes: traffic.requested.written_bytes(|_| true),
+            tile_written_bytes: traffic.requested.written_bytes(|structure| structure != Structure::Header),
         }
     }
 }

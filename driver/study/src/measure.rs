@@ -10,7 +10,7 @@ use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{FrameParameters, Tile};
+use photoncard_shared::message::{Drain, FrameParameters, Tile};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,8 @@ pub struct TileMeasurement {
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
     pub reads: [ReadSums; STRUCTURES],
+    /// Bytes written of what waits in card memory.
+    pub waiting_written_bytes: u64,
     /// Counts of the nodes, triangles, photons and other data in the lines of memory that the chip read.
     pub contents: Contents,
 }
@@ -61,7 +63,9 @@ impl TileMeasurement {
             let [requested, fetched] = traffic.of(|other| other == structure);
             ReadSums { requests: requested.requests, raw_bytes: requested.bytes, dram_bytes: fetched.bytes }
         });
-        Self { tile, stands_for, counters, reads, contents: traffic.contents }
+        let waiting_written_bytes =
+            traffic.requested.written_bytes(|structure| structure == Structure::Waiting);
+        Self { tile, stands_for, counters, reads, waiting_written_bytes, contents: traffic.contents }
     }
 
     /// Reads of the photon map.
@@ -69,9 +73,9 @@ impl TileMeasurement {
         self.sum(Structure::is_photon_map)
     }
 
-    /// Reads of everything but the photon map.
+    /// Reads of the scene.
     pub fn scene(&self) -> ReadSums {
-        self.sum(|structure| !structure.is_photon_map())
+        self.sum(Structure::is_scene)
     }
 
     /// Reads of one structure.
@@ -119,9 +123,12 @@ impl Measurement {
         self.total(|tile| tile.scene().dram_bytes as f64)
     }
 
-    /// Bytes of photon map and scene fetched from DRAM.
+    /// Bytes of photon map and scene fetched from DRAM, and bytes read and written of what waits there.
     pub fn dram_bytes(&self) -> Estimate {
-        self.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64)
+        self.total(|tile| {
+            let read = tile.sum(|_| true).dram_bytes;
+            (read + tile.waiting_written_bytes) as f64
+        })
     }
 }
 
@@ -179,7 +186,10 @@ impl Bench<'_> {
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
         let all = all_tiles(settings, chip);
-        if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
+        let is_in_rounds = frame.drain == Drain::Buckets;
+        let are_several =
+            settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1;
+        if is_in_rounds || are_several {
             return self.in_flight(chip, &frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));

@@ -2,7 +2,7 @@
 
 use photoncard_shared::budget::{Budget, MAX_BINS};
 use photoncard_shared::image::{Header, SectionKind};
-use photoncard_shared::message::{Fault, FrameParameters, Parameter, Radiance};
+use photoncard_shared::message::{Drain, Fault, FrameParameters, Parameter, Radiance};
 
 /// Checks a frame's parameters against the budget and the card image.
 ///
@@ -29,6 +29,7 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::MaxDistance, is_positive(frame.max_distance)),
         (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
         (Parameter::Bins, within(frame.bins, MAX_BINS)),
+        (Parameter::Drain, frame.drain != Drain::Buckets || budget.waiting_blocks > 0),
         (Parameter::Queue, frame.queue >= 1),
         (Parameter::InFlight, frame.in_flight >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),

@@ -72,7 +72,7 @@ impl Loader {
         let count = u32::try_from(lines.len()).map_err(|_| fault)?;
         let end =
             first.checked_add(count).filter(|&end| end <= self.lines && rest.is_empty()).ok_or(fault)?;
-        memory.write(LineAddress(first), lines).ok_or(fault)?;
+        memory.write(Structure::Header, LineAddress(first), lines).ok_or(fault)?;
         Ok(end)
     }
 

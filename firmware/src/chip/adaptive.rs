@@ -35,6 +35,16 @@ pub(super) struct Paths(u8);
 impl Paths {
     pub(super) const ONE: Self = Self(1);
 
+    /// Number of paths per sample.
+    pub(super) fn number(self) -> u8 {
+        self.0
+    }
+
+    /// Paths with this number per sample, at least 1.
+    pub(super) fn of_number(number: u8) -> Self {
+        Self(number.max(1))
+    }
+
     /// Number of paths of sample number `sample`: 1 for a probe.
     pub(super) fn of_sample(self, sample: u32) -> u32 {
         if sample < PROBES { 1 } else { self.0.into() }

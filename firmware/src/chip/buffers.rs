@@ -1,21 +1,27 @@
 //! Buffers that all tiles in flight of a chip share.
 
-use photoncard_shared::budget::{Budget, gather_candidates};
+use photoncard_shared::budget::{Budget, gather_buckets, gather_candidates};
 
 use super::gathers::Gathers;
 use super::pixel_sums::PixelSums;
 use super::points::Points;
+use super::rounds::Rounds;
 use crate::irradiance_cache::RecordStore;
 use crate::kind::ChipKind;
 
-/// Gather points, pixel sums, gathers and kept irradiance records of a chip.
+/// Gather points, pixel sums, gathers, waiting blocks and kept irradiance records of a chip.
 pub(super) struct Shared<K: ChipKind> {
     /// Gather points of the tile whose rays are being cast.
     pub(super) points: Points<K::Points>,
     pub(super) sums: PixelSums<K::TilePixels>,
-    pub(super) gathers: Gathers<K::Candidates, K::GatherQueue>,
+    pub(super) gathers: SharedGathers<K>,
+    pub(super) rounds: Rounds<K::WaitingBlocks>,
     pub(super) store: RecordStore,
 }
+
+/// Gathers of a chip of kind `K`.
+pub(super) type SharedGathers<K> =
+    Gathers<<K as ChipKind>::Candidates, <K as ChipKind>::GatherQueue, <K as ChipKind>::Buckets>;
 
 impl<K: ChipKind> Shared<K> {
     pub(super) const fn new() -> Self {
@@ -23,6 +29,7 @@ impl<K: ChipKind> Shared<K> {
             points: Points::new(),
             sums: PixelSums::new(),
             gathers: Gathers::new(),
+            rounds: Rounds::new(),
             store: RecordStore::EMPTY,
         }
     }
@@ -32,6 +39,9 @@ impl<K: ChipKind> Shared<K> {
     pub(super) fn reserve(&mut self, budget: &Budget, points: usize) {
         self.points.reserve(points);
         self.sums.reserve(budget.tile_pixels as usize);
-        self.gathers.reserve(gather_candidates(budget.neighbors), budget.gather_queue as usize);
+        let blocks = budget.waiting_blocks as usize;
+        let buckets = if blocks == 0 { 0 } else { gather_buckets(budget.gather_queue) };
+        self.gathers.reserve(gather_candidates(budget.neighbors), budget.gather_queue as usize, buckets);
+        self.rounds.reserve(blocks);
     }
 }

@@ -9,12 +9,14 @@ use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
 use super::adaptive::{self, Paths};
 use super::finished_pixel::Completion;
 use super::position::{Block, Pass, Position};
+use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{IrradianceCache, Window};
 use crate::kind::{Buffer, Capacity, ChipKind, Vacant};
+use crate::memory::{MemoryPort, WordReader, WordWriter};
 use crate::render::PixelSample;
 
 /// Capacity of the stack of blocks, sufficient for all halvings of a tile.
-const MAX_BLOCKS: usize = 32;
+pub(super) const MAX_BLOCKS: usize = 32;
 
 /// Value in [`Flight::sums`] of a pixel that, as far as is known, has no gather rays.
 const PLAIN: u16 = u16::MAX;
@@ -32,6 +34,10 @@ pub(super) struct Flight<K: ChipKind> {
     pub(super) position: Position,
     /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
+    /// Number of the block in its round; `None` in a frame without rounds.
+    pub(super) block_number: Option<usize>,
+    /// Number of the tile among those whose blocks wait; 0 in a frame without rounds.
+    pub(super) tile_number: usize,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
     /// For each pixel of the block, its number among the tile's pixels in [`super::pixel_sums::PixelSums`];
     /// or [`PLAIN`] or [`UNSUMMED`].
@@ -50,6 +56,8 @@ impl<K: ChipKind> Vacant for Flight<K> {
         block: Block::EMPTY,
         position: Position::VACANT,
         waiting: 0,
+        block_number: None,
+        tile_number: 0,
         cache: IrradianceCache::new(),
         sums: Buffer::EMPTY,
         paths: Buffer::EMPTY,
@@ -79,7 +87,44 @@ impl<K: ChipKind> Flight<K> {
         self.position = Position::VACANT;
         self.blocks.clear();
         self.waiting = 0;
+        self.block_number = None;
+        self.tile_number = 0;
         self.completion = None;
+    }
+
+    /// Goes on with a tile whose remaining blocks are `blocks`.
+    pub(super) fn resume(
+        &mut self,
+        tile: Tile,
+        counters: Counters,
+        number: usize,
+        blocks: Vec<Block, MAX_BLOCKS>,
+    ) {
+        self.vacate();
+        self.tile = tile;
+        self.counters = counters;
+        self.tile_number = number;
+        self.blocks = blocks;
+        self.position = Position::at(Pass::NextBlock);
+    }
+
+    /// Number of pixels of the next block; 0 if all have begun.
+    pub(super) fn pixels_of_next_block(&self) -> u32 {
+        self.blocks.last().map_or(0, Block::pixels)
+    }
+
+    /// Removes the blocks that have not begun.
+    pub(super) fn take_blocks(&mut self) -> Vec<Block, MAX_BLOCKS> {
+        core::mem::take(&mut self.blocks)
+    }
+
+    /// Target of the gathers of a point of the block. `flight` is the number of the tile in flight.
+    #[inline(always)]
+    pub(super) fn target(&self, flight: usize, point: PointIndex) -> GatherTarget {
+        match self.block_number {
+            None => GatherTarget::new(flight, point),
+            Some(block) => GatherTarget::of_block(block, point),
+        }
     }
 
     pub(super) fn pass(&self) -> Pass {
@@ -97,11 +142,8 @@ impl<K: ChipKind> Flight<K> {
     }
 
     pub(super) fn begin_block(&mut self, frame: &FrameParameters) -> Result<(), Fault> {
-        self.block = self.blocks.pop().ok_or(Invariant::Block.fault())?;
-        self.set_all_sums(PLAIN)?;
-        self.paths.clear();
-        let has_room = self.paths.resize(self.block.pixels() as usize, Paths::ONE);
-        has_room.then_some(()).ok_or(Invariant::Pixels.fault())?;
+        let block = self.blocks.pop().ok_or(Invariant::Block.fault())?;
+        self.set_block(block)?;
         match allowed_error(frame) {
             None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
             None => self.do_without_records()?,
@@ -109,6 +151,28 @@ impl<K: ChipKind> Flight<K> {
             Some(_) => self.begin_records()?,
         }
         Ok(())
+    }
+
+    /// Sets the block, whose pixels have no gather rays and one path per sample.
+    pub(super) fn set_block(&mut self, block: Block) -> Result<(), Fault> {
+        self.block = block;
+        self.set_all_sums(PLAIN)?;
+        self.paths.clear();
+        let has_room = self.paths.resize(self.block.pixels() as usize, Paths::ONE);
+        has_room.then_some(()).ok_or(Invariant::Pixels.fault())
+    }
+
+    /// Writes the numbers of sums and of paths of all pixels of the block.
+    pub(super) fn save_pixels<M: MemoryPort>(&self, words: &mut WordWriter<M>) -> Result<(), Fault> {
+        words.packed::<16>(self.sums.values().iter().map(|&number| number.into()))?;
+        words.packed::<8>(self.paths.values().iter().map(|&paths| paths.number().into()))
+    }
+
+    /// Reads what [`Self::save_pixels`] has written of a block with as many pixels.
+    pub(super) fn restore_pixels<M: MemoryPort>(&mut self, words: &mut WordReader<M>) -> Result<(), Fault> {
+        let pixels = self.block.pixels() as usize;
+        words.packed::<16>(pixels, |pixel, number| self.set_sum(pixel as u32, number as u16))?;
+        words.packed::<8>(pixels, |pixel, paths| self.set_paths(pixel as u32, Paths::of_number(paths as u8)))
     }
 
     /// Returns true if blocks of the tile have not begun.

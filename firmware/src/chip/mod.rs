@@ -16,6 +16,7 @@
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
 //! | `Points` | nothing; it holds the gather points of the tile whose rays are being cast |
 //! | `Gathers` | nothing; it is the queue, in which each gather names its tile in flight |
+//! | `Rounds` | in a frame in rounds ([`Drain::Buckets`](photoncard_shared::message::Drain::Buckets)), its counters; its blocks in card memory |
 //! | `RecordStore` | nothing; it locates the irradiance records that frames of one picture share |
 
 mod adaptive;
@@ -30,6 +31,7 @@ mod pixels;
 mod points;
 mod position;
 mod records;
+mod rounds;
 mod stored_point;
 #[cfg(test)]
 mod test_frame;
@@ -39,14 +41,15 @@ mod tests;
 use core::ops::Range;
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
+use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant, Tile};
 
 use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
 use self::flight::Flight;
 pub use self::light::{Component, PixelLight};
 use self::position::{Pass, Position};
-use crate::gather::{GatherQueue, PointIndex};
+use self::rounds::Rounds;
+use crate::gather::{Buckets, GatherQueue, PointIndex};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::{
@@ -100,7 +103,9 @@ impl<K: FixedKind> Default for Chip<K> {
 impl<K: FixedKind> Chip<K> {
     /// On-chip memory that each technique adds to the chip, bytes.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
-        reordering: size_of::<GatherQueue<K::GatherQueue>>(),
+        reordering: size_of::<GatherQueue<K::GatherQueue>>()
+            + size_of::<Buckets<K::Buckets>>()
+            + size_of::<Rounds<K::WaitingBlocks>>(),
         irradiance_cache: K::Flights::ENTRIES * size_of::<IrradianceCache<K::IrradianceRecords>>(),
         importance_sampling: K::Points::ENTRIES * size_of::<DirectionTable>(),
     };
@@ -145,15 +150,20 @@ impl<K: ChipKind> Chip<K> {
     pub fn clear(&mut self) {
         self.active = None;
         self.shared.gathers.clear();
+        self.shared.gathers.empty_buckets();
+        self.shared.rounds.clear();
         for (number, flight) in self.flights.values_mut().iter_mut().enumerate() {
             flight.vacate();
             self.shared.sums.end(number);
         }
     }
 
-    /// Begins a frame. If `frame` asks for it, irradiance records are kept in `room`, a range of line
-    /// addresses of card memory past the card image. Without this call no records are kept.
+    /// Begins a frame, after [`Self::clear`]. If `frame` asks for it, gathers wait and irradiance records are
+    /// kept in `room`, a range of line addresses of card memory past the card image. Without this call no
+    /// records are kept, and gathers do not wait in card memory.
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
+        let room = self.shared.rounds.begin_frame(frame, self.kind.budget(), room);
+        self.shared.gathers.empty_buckets();
         self.shared.store.begin_frame(frame, room);
     }
 
@@ -171,18 +181,28 @@ impl<K: ChipKind> Chip<K> {
             return false;
         }
         let Some(number) = self.vacant(frame) else { return false };
-        let is_alone = self.find(|flight| flight.pass() != Pass::Vacant).is_none();
+        let is_alone =
+            self.find(|flight| flight.pass() != Pass::Vacant).is_none() && !self.shared.rounds.have_tiles();
         let Some(flight) = self.flights.values_mut().get_mut(number) else { return false };
         if is_alone {
             memory.begin_tile();
         }
         flight.begin(tile);
+        if frame.drain == Drain::Buckets {
+            let Some(number) = self.shared.rounds.open(tile) else { return false };
+            flight.tile_number = number;
+        }
         true
     }
 
     /// Index of the first entry of `flights` without a tile, among those that the frame may use.
     fn vacant(&self, frame: &FrameParameters) -> Option<usize> {
-        let flights = self.flights.values().iter().take(frame.in_flight.max(1) as usize);
+        let is_in_rounds = frame.drain == Drain::Buckets;
+        if is_in_rounds && !self.shared.rounds.accepts_tile() {
+            return None;
+        }
+        let in_flight = if is_in_rounds { 1 } else { frame.in_flight.max(1) };
+        let flights = self.flights.values().iter().take(in_flight as usize);
         flights.map(Flight::pass).position(|pass| pass == Pass::Vacant)
     }
 
@@ -194,6 +214,9 @@ impl<K: ChipKind> Chip<K> {
     /// Begins to drain the gather queue although it is not full, because no tile follows. Returns false if no
     /// gather waits.
     pub fn flush(&mut self, frame: &FrameParameters) -> bool {
+        if frame.drain == Drain::Buckets {
+            return self.shared.rounds.flush();
+        }
         let waits = !self.shared.gathers.is_empty();
         if waits && !self.shared.gathers.is_draining() {
             self.begin_drain(frame);
@@ -225,6 +248,9 @@ impl<K: ChipKind> Chip<K> {
     /// completion, or one step of a pass. Adds the piece's number of rays and gathers to `work`.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, work: &mut u64) -> Result<Progress, Fault> {
+        if job.frame.drain == Drain::Buckets {
+            return self.piece_in_rounds(job, work);
+        }
         if self.shared.gathers.is_draining() {
             self.drain(job)?;
             *work += GATHERS_PER_PIECE;
@@ -241,6 +267,20 @@ impl<K: ChipKind> Chip<K> {
             self.begin_drain(job.frame);
             return Ok(Progress::Busy);
         }
+        self.go_on_with_pass(job, number, pass, work)
+    }
+
+    /// Does the next step of a pass of tile in flight `number`.
+    #[inline(always)]
+    fn go_on_with_pass<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        number: usize,
+        pass: Pass,
+        work: &mut u64,
+    ) -> Result<Progress, Fault> {
+        let Self { flights, shared, .. } = self;
+        let flight = flights.values_mut().get_mut(number).ok_or(Invariant::Flight.fault())?;
         let done = flight.counters.rays_and_gathers();
         match pass {
             Pass::ReadKept => flight.read_kept(job, shared)?,
@@ -305,6 +345,9 @@ impl<K: ChipKind> Chip<K> {
                 return Ok(Progress::Busy);
             }
             shared.sums.end(number);
+            if job.frame.drain == Drain::Buckets {
+                return self.end_block_in_rounds();
+            }
             if flight.has_blocks() {
                 flight.position = Position::at(Pass::NextBlock);
                 return Ok(Progress::Busy);

@@ -114,6 +114,22 @@ impl<C: Capacity> PixelSums<C> {
         Ok(())
     }
 
+    /// Number of pixels in the run of the tile in flight with index `flight`.
+    pub(super) fn len(&self, flight: usize) -> u32 {
+        self.runs.get(flight).map_or(0, |run| run.count)
+    }
+
+    /// Sums of pixel `number` in the run of a tile, mutable.
+    pub(super) fn of_pixel(
+        &mut self,
+        frame: &FrameParameters,
+        (flight, number): (usize, u16),
+    ) -> Result<&mut [ColourSum], Fault> {
+        let count = sums_of_pixel(frame.layers) as usize;
+        let first = self.place(frame, flight, number)? * count;
+        self.sums.values_mut().get_mut(first..first + count).ok_or(Invariant::Sums.fault())
+    }
+
     /// Light of pixel `number` in the run of a tile.
     pub(super) fn light(
         &self,

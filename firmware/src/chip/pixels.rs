@@ -10,7 +10,7 @@ use super::flight::{Flight, allowed_error};
 use super::light::Component;
 use super::position::Pass;
 use super::stored_point::{StoredPoint, StoredRays, pattern};
-use crate::gather::{GatherTarget, PointIndex};
+use crate::gather::PointIndex;
 use crate::irradiance_cache::{IrradianceCache, SeenSample};
 use crate::kind::{Capacity, ChipKind};
 use crate::memory::{MemoryPort, Stage};
@@ -205,12 +205,12 @@ impl<K: ChipKind> Flight<K> {
         let (_, stored) = shared.points.get(index)?;
         let number = self.sum(pixel.into()).ok_or(Invariant::Sums.fault())?;
         let index_in_tile = self.index_in_tile(pixel.into());
+        let target = self.target(flight, PointIndex::Pixel(number));
         let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
         context.memory.enter(Stage::GatherRay);
         let mut point = stored.point(pattern);
         point.weight = weight;
         stored.read_surface(context, at, &mut point.surface)?;
-        let target = GatherTarget::new(flight, PointIndex::Pixel(number));
         let mut ends = final_gather::GatherRayEnds::new();
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
@@ -220,12 +220,14 @@ impl<K: ChipKind> Flight<K> {
                 match (end.request, outlet.as_deref_mut()) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
-                    (Some(request), None) => match shared.gathers.submit(context, request)? {
-                        None => self.waiting += 1,
-                        Some(brought) => {
-                            shared.sums.add(context.frame, sum, Component::Indirect, brought)?;
+                    (Some(request), None) => {
+                        match shared.gathers.submit(context, &mut shared.rounds, request)? {
+                            None => self.waiting += 1,
+                            Some(brought) => {
+                                shared.sums.add(context.frame, sum, Component::Indirect, brought)?;
+                            }
                         }
-                    },
+                    }
                 }
             }
         }

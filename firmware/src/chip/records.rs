@@ -6,7 +6,7 @@ use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
 use super::position::{Pass, Position};
 use super::stored_point::StoredPoint;
-use crate::gather::{GatherTarget, PointIndex};
+use crate::gather::PointIndex;
 use crate::irradiance_cache::{Full, Recalled};
 use crate::kind::ChipKind;
 use crate::memory::MemoryPort;
@@ -92,27 +92,27 @@ impl<K: ChipKind> Flight<K> {
         shared: &mut Shared<K>,
         flight: usize,
     ) -> Result<(), Fault> {
-        let Shared { points, gathers, .. } = shared;
-        let Self { cache, counters, position, waiting, .. } = self;
+        let Shared { points, gathers, rounds, .. } = shared;
         let bins = job.frame.bins;
-        let Some((index, record)) = points.next(position) else {
-            if position.end_bin(bins) {
+        let Some((index, record)) = points.next(&self.position) else {
+            if self.position.end_bin(bins) {
                 self.position = Position::at(Pass::WaitForRecords);
             }
             return Ok(());
         };
+        let target = self.target(flight, PointIndex::Record(record));
+        let Self { cache, counters, position, waiting, .. } = self;
         let mut point = cache.point(job.frame, record.into()).ok_or(Invariant::Record.fault())?;
         let rays = points.take_rays(position, index, point.pattern, bins)?;
         point.directions = points.get(index)?.1.directions;
         let context = &mut job.context(counters);
-        let target = GatherTarget::new(flight, PointIndex::Record(record));
         let mut ends = final_gather::GatherRayEnds::new();
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
                 cache.add(record, end.cell, end.direct)?;
                 if let Some(request) = end.request {
-                    match gathers.submit(context, request)? {
+                    match gathers.submit(context, rounds, request)? {
                         None => *waiting += 1,
                         Some(brought) => cache.add(record, end.cell, brought)?,
                     }

@@ -8,12 +8,16 @@
 //! - *generative* reordering casts the rays of one bin of directions
 //!   ([`crate::importance::DirectionTable::bin`]) for all pixels of a tile before the rays of the next bin;
 //! - *deferred* reordering ([`GatherQueue`]) queues requests, and executes them by a hash of their position
-//!   or along a Hilbert curve.
+//!   or along a Hilbert curve;
+//! - a second level of the queue, in card memory ([`Buckets`]), holds the gathers of many tiles.
 
+mod buckets;
+mod chain;
 mod order;
 mod queue;
 mod request;
 
+pub use buckets::{Buckets, MAX_BUCKET_LINE, RESULTS_PER_LINE, Results, WrittenResults};
 pub use order::{HilbertCode, hilbert_cell, hilbert_index};
 pub use queue::GatherQueue;
-pub use request::{GatherRequest, GatherTarget, PointIndex};
+pub use request::{GatherRequest, GatherResult, GatherTarget, PointIndex, REQUEST_BYTES, RESULT_BYTES};

@@ -28,6 +28,25 @@ const LEAST_LENGTH: f32 = 64.0;
 pub struct HilbertCode(u64);
 
 impl HilbertCode {
+    /// Code of the first point of the curve.
+    pub const ORIGIN: Self = Self(0);
+
+    /// All bits of the code.
+    pub const fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// Code with these bits.
+    pub const fn of_bits(bits: u64) -> Self {
+        Self(bits)
+    }
+
+    /// Number, below `1 << bits`, of the part of the curve that contains the position, if the curve is
+    /// divided into parts that are equally long; `bits` is below 64.
+    pub const fn part(self, bits: u32) -> usize {
+        (self.0 >> 1 >> (u64::BITS - 1 - bits)) as usize
+    }
+
     /// Code of the grid point nearest to a position, metres.
     #[inline(always)]
     pub fn new(grid: &PhotonGrid, position: [f32; 3]) -> Self {
@@ -84,7 +103,7 @@ impl HilbertCode {
         match drain {
             Drain::Immediate => 0,
             Drain::Hash => self.bucket() as u64,
-            Drain::Sort => self.0,
+            Drain::Sort | Drain::Buckets => self.0,
         }
     }
 }

@@ -56,6 +56,17 @@ impl<C: Capacity> GatherQueue<C> {
         self.draining
     }
 
+    /// Requests in the first `count` places of the queue, for use as a buffer; fewer if it has fewer places.
+    /// The queue must not be drained meanwhile, and be cleared afterwards.
+    pub fn places(&mut self, count: usize) -> &mut [GatherRequest] {
+        let count = count.min(self.waiting.capacity());
+        if self.waiting.values().len() != count {
+            // Always fits: at most the capacity.
+            let _ = self.waiting.resize(count, GatherRequest::NONE);
+        }
+        self.waiting.values_mut()
+    }
+
     /// Appends a request.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! A waiting gather: position, partial reflection, and the sum that the gathered radiance is added to.
 
-use photoncard_shared::budget::{MAX_IN_FLIGHT, MAX_TILE_PIXELS};
+use glam::Vec3;
+use photoncard_shared::budget::{MAX_IN_FLIGHT, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS, MAX_WAITING_POINTS};
 
 use super::HilbertCode;
 use crate::scene::PartialReflection;
@@ -16,10 +17,77 @@ pub struct GatherRequest {
     pub target: GatherTarget,
 }
 
-const _: () = assert!(size_of::<GatherRequest>() == 24);
+/// Length of an encoded request, bytes.
+pub const REQUEST_BYTES: usize = 24;
+const _: () = assert!(size_of::<GatherRequest>() == REQUEST_BYTES);
+
+impl GatherRequest {
+    /// Request that nothing refers to.
+    pub const NONE: Self = Self {
+        position: HilbertCode::ORIGIN,
+        reflection: PartialReflection::NONE,
+        target: GatherTarget::new(0, PointIndex::Pixel(0)),
+    };
+
+    /// Encodes the request.
+    pub fn to_bytes(&self) -> [u8; REQUEST_BYTES] {
+        let position = self.position.bits().to_le_bytes().into_iter();
+        let parts = position.chain(self.reflection.to_bytes()).chain(self.target.to_bytes());
+        let mut bytes = [0; REQUEST_BYTES];
+        bytes.iter_mut().zip(parts).for_each(|(byte, part)| *byte = part);
+        bytes
+    }
+
+    /// Request of the bytes that [`Self::to_bytes`] returned.
+    pub fn from_bytes(bytes: &[u8; REQUEST_BYTES]) -> Self {
+        let (position, rest) = bytes.split_first_chunk().unwrap_or((&[0; 8], &[]));
+        let (reflection, rest) = rest.split_first_chunk().unwrap_or((&[0; 13], &[]));
+        let target = rest.first_chunk().copied().unwrap_or_default();
+        Self {
+            position: HilbertCode::of_bits(u64::from_le_bytes(*position)),
+            reflection: PartialReflection::from_bytes(reflection),
+            target: GatherTarget::from_bytes(target),
+        }
+    }
+}
+
+/// Radiance that a gather has brought, and the sum to which it is added; 15 bytes in card memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GatherResult {
+    /// Sum to which the radiance is added.
+    pub target: GatherTarget,
+    /// Radiance, in the card image's radiance units.
+    pub brought: Vec3,
+}
+
+/// Length of an encoded result, bytes.
+pub const RESULT_BYTES: usize = 15;
+
+impl GatherResult {
+    /// Result without light.
+    pub const NONE: Self = Self { target: GatherRequest::NONE.target, brought: Vec3::ZERO };
+
+    /// Encodes the result.
+    pub fn to_bytes(&self) -> [u8; RESULT_BYTES] {
+        let brought = self.brought.to_array().into_iter().flat_map(f32::to_le_bytes);
+        let mut bytes = [0; RESULT_BYTES];
+        let parts = self.target.to_bytes().into_iter().chain(brought);
+        bytes.iter_mut().zip(parts).for_each(|(byte, part)| *byte = part);
+        bytes
+    }
+
+    /// Result of the bytes that [`Self::to_bytes`] returned.
+    pub fn from_bytes(bytes: &[u8; RESULT_BYTES]) -> Self {
+        let (target, rest) = bytes.split_first_chunk().unwrap_or((&[0; 3], &[]));
+        let channels: [[u8; 4]; 3] = rest.as_chunks().0.first_chunk().copied().unwrap_or_default();
+        let brought = Vec3::from_array(channels.map(f32::from_le_bytes));
+        Self { target: GatherTarget::from_bytes(*target), brought }
+    }
+}
 
 /// Identity of the sum to which the radiance of a gather is added, 3 bytes: the tile in flight, the gather
-/// point in it, and the cell of the hemisphere that contains the gather ray.
+/// point in it, and the cell of the hemisphere that contains the gather ray. A gather that waits in card
+/// memory names its block instead, by 3 further bits in place of the upper ones of the point's index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherTarget {
     /// Index of the gather point in 15 bits, and the flag [`Self::OF_RECORD`]; little-endian.
@@ -41,6 +109,11 @@ const CELL_BITS: u32 = 5;
 const _: () = assert!(crate::importance::CELLS <= 1 << CELL_BITS);
 const _: () = assert!(MAX_IN_FLIGHT <= 1 << (u8::BITS - CELL_BITS));
 const _: () = assert!(MAX_TILE_PIXELS <= GatherTarget::OF_RECORD as u32);
+/// Number of bits of a number of a tile in flight.
+const FLIGHT_BITS: u32 = u8::BITS - CELL_BITS;
+/// Number of bits of the index of a gather point in a block whose gathers wait in card memory.
+const WAITING_POINT_BITS: u32 = MAX_WAITING_POINTS.ilog2();
+const _: () = assert!(MAX_WAITING_BLOCKS * MAX_WAITING_POINTS <= MAX_TILE_PIXELS << FLIGHT_BITS);
 
 impl GatherTarget {
     /// Flag of an irradiance record.
@@ -54,6 +127,31 @@ impl GatherTarget {
             PointIndex::Record(index) => index | Self::OF_RECORD,
         };
         Self { point: bits.to_le_bytes(), cell_and_flight: (flight as u8) << CELL_BITS }
+    }
+
+    /// Target of the gathers of `point` in block number `block`, which is below [`MAX_WAITING_BLOCKS`]; the
+    /// point's index is below [`MAX_WAITING_POINTS`]. The cell is 0.
+    pub const fn of_block(block: usize, point: PointIndex) -> Self {
+        let upper = (block as u16 >> FLIGHT_BITS) << WAITING_POINT_BITS;
+        let flight = block & ((1 << FLIGHT_BITS) - 1);
+        Self::new(
+            flight,
+            match point {
+                PointIndex::Pixel(index) => PointIndex::Pixel(index | upper),
+                PointIndex::Record(index) => PointIndex::Record(index | upper),
+            },
+        )
+    }
+
+    /// Number of the block, and index of the gather point in it, of a target made by [`Self::of_block`].
+    #[inline(always)]
+    pub const fn block_and_point(self) -> (usize, PointIndex) {
+        const POINT: u16 = MAX_WAITING_POINTS as u16 - 1;
+        let (index, point) = match self.point() {
+            PointIndex::Pixel(index) => (index, PointIndex::Pixel(index & POINT)),
+            PointIndex::Record(index) => (index, PointIndex::Record(index & POINT)),
+        };
+        (self.flight() | (index as usize >> WAITING_POINT_BITS) << FLIGHT_BITS, point)
     }
 
     /// Returns the target with its cell set to `cell`, which contains the gather ray's direction.
@@ -74,6 +172,17 @@ impl GatherTarget {
     #[inline(always)]
     pub const fn cell(self) -> u8 {
         self.cell_and_flight & ((1 << CELL_BITS) - 1)
+    }
+
+    /// Encodes the target.
+    pub const fn to_bytes(self) -> [u8; 3] {
+        let [low, high] = self.point;
+        [low, high, self.cell_and_flight]
+    }
+
+    /// Target of the bytes that [`Self::to_bytes`] returned.
+    pub const fn from_bytes([low, high, cell_and_flight]: [u8; 3]) -> Self {
+        Self { point: [low, high], cell_and_flight }
     }
 
     /// Index of the gather point.

@@ -1,29 +1,12 @@
 //! Format of kept irradiance records: lines of little-endian 32-bit words. Floats are stored as their bits.
 
 use glam::Vec3;
-use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::address::Line;
 
 use super::packed_normal::PackedNormal;
 use super::record::{Content, Irradiance, Record};
 use super::{LatticePoint, MAX_ROOTS, Window};
-
-pub(super) const WORDS: usize = LINE_BYTES / 4;
-
-pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
-    let mut words = [0; WORDS];
-    for (word, bytes) in words.iter_mut().zip(line.0.as_chunks().0) {
-        *word = u32::from_le_bytes(*bytes);
-    }
-    words
-}
-
-pub(super) fn line_of(words: [u32; WORDS]) -> Line {
-    let mut line = Line::ZERO;
-    for (bytes, word) in line.0.as_chunks_mut().0.iter_mut().zip(words) {
-        *bytes = word.to_le_bytes();
-    }
-    line
-}
+use crate::memory::{WORDS, line_of, words_of};
 
 /// Builds a line from its first words. The others are 0.
 fn line_of_first(first: impl IntoIterator<Item = u32>) -> Line {

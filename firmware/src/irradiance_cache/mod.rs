@@ -36,12 +36,14 @@ mod kept_line;
 mod lattice;
 mod packed_normal;
 mod record;
+mod saved;
 mod store;
 mod survey;
 mod survey_state;
 
 pub use interpolation::SeenSample;
 pub use lattice::{LatticePoint, Window};
+pub use saved::most_cache_words;
 pub use store::{Recalled, RecordStore};
 
 use glam::Vec3;

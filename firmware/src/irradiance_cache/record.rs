@@ -29,10 +29,10 @@ pub(super) enum Content {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GatherSums {
     /// Coefficients of the translational gradient by cell of the hemisphere, bfloat16.
-    coefficients: [[u16; 2]; CELLS],
-    mean: ColourSum,
-    translation: [ColourSum; 2],
-    rotation: [ColourSum; 2],
+    pub(super) coefficients: [[u16; 2]; CELLS],
+    pub(super) mean: ColourSum,
+    pub(super) translation: [ColourSum; 2],
+    pub(super) rotation: [ColourSum; 2],
 }
 
 /// Strongest term of a record's sums, and the strength of the second strongest term. A term is the weighted
@@ -40,10 +40,10 @@ pub(super) struct GatherSums {
 /// The type has an alignment of 1 byte, so that it fits beside the tag of [`Content`] and enlarges no record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Strongest {
-    light: Rgbe,
-    cell: u8,
+    pub(super) light: Rgbe,
+    pub(super) cell: u8,
     /// Strength of the second strongest term, bfloat16.
-    second: [u8; 2],
+    pub(super) second: [u8; 2],
 }
 
 const _: () = assert!(size_of::<Content>() == size_of::<GatherSums>() + align_of::<GatherSums>());

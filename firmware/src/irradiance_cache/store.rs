@@ -19,10 +19,10 @@ use core::ops::Range;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{self, Drain, Fault, FrameParameters, Invariant};
 
-use super::kept_line::{BlockHead, KeptRecord, WORDS, line_of, words_of};
+use super::kept_line::{BlockHead, KeptRecord};
 use super::{IrradianceCache, MAX_ROOTS, Window};
 use crate::kind::{Capacity, Map};
-use crate::memory::{MemoryPort, Stage};
+use crate::memory::{MemoryPort, Stage, WORDS, line_of, words_of};
 use crate::render::Context;
 use crate::sampler::hash;
 
@@ -205,7 +205,7 @@ fn read<M: MemoryPort>(memory: &mut M, address: u32) -> Result<&Line, Fault> {
 }
 
 fn write<M: MemoryPort>(memory: &mut M, address: u32, line: &Line) -> Option<()> {
-    memory.write(LineAddress(address), &[line.0])
+    memory.write(Structure::IrradianceRecords, LineAddress(address), &[line.0])
 }
 
 /// Key of a frame; `None` if the frame keeps no records.

@@ -1,7 +1,10 @@
 //! Trait of a kind of chip, and the memory that its techniques and caches take.
 
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{Budget, MAX_IN_FLIGHT, MAX_TILE_PIXELS, gather_candidates};
+use photoncard_shared::budget::{
+    Budget, MAX_IN_FLIGHT, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS, MAX_WAITING_POINTS, gather_buckets,
+    gather_candidates,
+};
 
 use super::capacity::{Capacity, FixedCapacity};
 use crate::irradiance_cache::MIN_RECORDS;
@@ -16,6 +19,11 @@ pub trait ChipKind: 'static {
     type Candidates: Capacity;
     /// Containers for queued gathers, with capacity [`Budget::gather_queue`].
     type GatherQueue: Capacity;
+    /// Containers for the buckets of gathers in card memory, with capacity [`gather_buckets`].
+    type Buckets: Capacity;
+    /// Containers for the blocks whose gathers wait in card memory, with capacity
+    /// [`Budget::waiting_blocks`].
+    type WaitingBlocks: Capacity;
     /// Containers for the irradiance records of a tile, with capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
     /// Containers for gather points whose rays are cast together. The points belong to all irradiance records
@@ -34,6 +42,8 @@ pub trait FixedKind:
         TilePixels: FixedCapacity,
         Candidates: FixedCapacity,
         GatherQueue: FixedCapacity,
+        Buckets: FixedCapacity,
+        WaitingBlocks: FixedCapacity,
         IrradianceRecords: FixedCapacity,
         Points: FixedCapacity,
         Flights: FixedCapacity,
@@ -50,7 +60,7 @@ pub trait FixedKind:
 /// On-chip memory that each technique adds to a chip, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TechniqueMemory {
-    /// Deferred reordering: the gather queue.
+    /// Deferred reordering: the gather queue, and the tables of what waits in card memory.
     pub reordering: usize,
     /// Irradiance cache: the irradiance records of all tiles in flight, and the sums of their gathers.
     pub irradiance_cache: usize,
@@ -74,6 +84,14 @@ pub(crate) const fn check<K: FixedKind>() {
     assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");
     assert!(K::Candidates::ENTRIES == gather_candidates(budget.neighbors), "Candidates is not of the budget");
     assert!(K::GatherQueue::ENTRIES == budget.gather_queue as usize, "GatherQueue is not of the budget");
+    let buckets = if budget.waiting_blocks == 0 { 0 } else { gather_buckets(budget.gather_queue) };
+    assert!(K::Buckets::ENTRIES == buckets, "Buckets is not of the budget");
+    let blocks = budget.waiting_blocks;
+    assert!(K::WaitingBlocks::ENTRIES == blocks as usize, "WaitingBlocks is not of the budget");
+    assert!(blocks <= MAX_WAITING_BLOCKS, "the target of a gather has 6 bits for its block");
+    let points = budget.tile_pixels <= MAX_WAITING_POINTS && budget.irradiance_records <= MAX_WAITING_POINTS;
+    assert!(blocks == 0 || points, "the target of a gather of a waiting block has 12 bits for its point");
+    assert!(blocks == 0 || buckets > 0, "gathers that wait in card memory need a line in the queue");
     let records = K::IrradianceRecords::ENTRIES;
     assert!(records == budget.irradiance_records as usize, "IrradianceRecords is not of the budget");
     assert!(K::Flights::ENTRIES == budget.in_flight as usize, "Flights is not of the budget");

@@ -1,6 +1,6 @@
 //! The micro chip, whose budget is that of a microcontroller: the whole renderer fits into its SRAM.
 
-use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
+use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_buckets, gather_candidates};
 
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
@@ -21,6 +21,7 @@ pub const MICRO: Budget = Budget {
     samples: 4096,
     tiles: 2,
     in_flight: 1,
+    waiting_blocks: 8,
 };
 
 /// Kind of the micro chip ([`MICRO`]).
@@ -31,6 +32,8 @@ impl ChipKind for Micro {
     type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
     type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
+    type Buckets = Entries<{ gather_buckets(MICRO.gather_queue) }>;
+    type WaitingBlocks = Entries<{ MICRO.waiting_blocks as usize }>;
     type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
     type Points = Entries<256>;
     type Flights = Entries<{ MICRO.in_flight as usize }>;
@@ -43,9 +46,6 @@ impl ChipKind for Micro {
 impl FixedKind for Micro {
     const KIND: Self = Self;
     const BUDGET: Budget = MICRO;
-    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: (24 << 10) + 64,
-        irradiance_cache: 48 << 10,
-        importance_sampling: 8704,
-    };
+    const TECHNIQUE_LIMITS: TechniqueMemory =
+        TechniqueMemory { reordering: 30 << 10, irradiance_cache: 48 << 10, importance_sampling: 8704 };
 }

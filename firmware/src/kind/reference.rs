@@ -1,6 +1,8 @@
 //! The reference chip, which has the cache sizes of Steinhurst's dissertation (2007).
 
-use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_candidates};
+use photoncard_shared::budget::{
+    Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_buckets, gather_candidates,
+};
 
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
@@ -18,12 +20,13 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 17_200,
+    gather_queue: 15_700,
     irradiance_records: 512,
     shadow_rays: 64,
     samples: 4096,
     tiles: 4,
     in_flight: 1,
+    waiting_blocks: 64,
 };
 
 /// Kind of the reference chip ([`REFERENCE`]).
@@ -34,6 +37,8 @@ impl ChipKind for Reference {
     type TilePixels = Entries<{ REFERENCE.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(REFERENCE.neighbors) }>;
     type GatherQueue = Entries<{ REFERENCE.gather_queue as usize }>;
+    type Buckets = Entries<{ gather_buckets(REFERENCE.gather_queue) }>;
+    type WaitingBlocks = Entries<{ REFERENCE.waiting_blocks as usize }>;
     type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
     type Points = Entries<2048>;
     type Flights = Entries<{ REFERENCE.in_flight as usize }>;

@@ -48,9 +48,9 @@ impl<M: MemoryPort> MemoryPort for Counted<M> {
         Ok(line)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)?;
-        self.traffic.written_bytes += lines.len() as u64 * LINE_BYTES as u64;
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(structure, first, lines)?;
+        self.traffic.count_written(structure, lines.len() as u64 * LINE_BYTES as u64);
         Some(())
     }
 

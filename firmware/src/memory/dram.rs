@@ -31,7 +31,7 @@ impl MemoryPort for Dram<'_> {
         self.lines.get(address.0 as usize)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let first = first.0 as usize;
         copy_lines(lines, self.lines.get_mut(first..first.checked_add(lines.len())?)?);
         Some(())

@@ -291,8 +291,8 @@ where
 {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
-        if structure == Structure::IrradianceRecords {
-            // Each line of kept records is read once, and would evict lines that are read again.
+        if matches!(structure, Structure::IrradianceRecords | Structure::Waiting) {
+            // Each of these lines is read once, and would evict lines that are read again.
             self.memory.missed(structure);
             return self.memory.read(structure, address, 0..LINE_BYTES as u32);
         }
@@ -303,8 +303,8 @@ where
         cache.read(&mut self.memory, structure, address)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)?;
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(structure, first, lines)?;
         let written = first.0..first.0.saturating_add(lines.len() as u32);
         self.first.forget(&written);
         if let Some(scene) = &mut self.scene {

@@ -8,6 +8,7 @@ mod counted;
 mod dram;
 mod line_cache;
 mod traffic;
+mod words;
 
 use core::ops::Range;
 
@@ -18,6 +19,7 @@ use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 pub use photoncard_shared::address::{STAGES, Stage};
 use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, Traffic};
+pub use words::{Room, WORDS, WordReader, WordWriter, line_of, words_of};
 
 /// Access of a chip to card memory. Caches and counters are `MemoryPort`s that wrap another `MemoryPort`.
 pub trait MemoryPort {
@@ -34,9 +36,15 @@ pub trait MemoryPort {
         None
     }
 
-    /// Writes lines from line `first` on. Returns `None`, and writes nothing, if some lines are outside the
-    /// memory or the memory is read-only.
-    fn write(&mut self, _first: LineAddress, _lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    /// Writes lines that belong to `structure`, from line `first` on. Lines of a card image are counted for
+    /// [`Structure::Header`], whatever they hold. Returns `None`, and writes nothing, if some lines are
+    /// outside the memory or the memory is read-only.
+    fn write(
+        &mut self,
+        _structure: Structure,
+        _first: LineAddress,
+        _lines: &[[u8; LINE_BYTES]],
+    ) -> Option<()> {
         None
     }
 
@@ -79,7 +87,7 @@ pub trait CardMemory: MemoryPort {
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
         let mut line = *self.stored(address, 1)?.first()?;
         *line.0.get_mut(place)? = byte;
-        self.write(address, &[line.0])
+        self.write(Structure::Header, address, &[line.0])
     }
 }
 

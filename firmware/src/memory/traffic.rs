@@ -27,19 +27,19 @@ impl Reads {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Traffic {
     reads: [[Reads; STRUCTURES]; STAGES],
-    /// Number of bytes written.
-    pub written_bytes: u64,
+    /// Number of bytes written of each structure.
+    written: [u64; STRUCTURES],
 }
 
 impl Traffic {
     /// Traffic without reads and writes.
-    pub const ZERO: Self = Self { reads: [[Reads::ZERO; STRUCTURES]; STAGES], written_bytes: 0 };
+    pub const ZERO: Self = Self { reads: [[Reads::ZERO; STRUCTURES]; STAGES], written: [0; STRUCTURES] };
 
     /// Adds the traffic of another memory.
     pub fn add(&mut self, other: &Self) {
         let pairs = self.reads.as_flattened_mut().iter_mut().zip(other.reads.as_flattened());
         pairs.for_each(|(reads, other)| reads.add(other));
-        self.written_bytes += other.written_bytes;
+        self.written.iter_mut().zip(other.written).for_each(|(written, other)| *written += other);
     }
 
     /// Counts one read.
@@ -49,6 +49,18 @@ impl Traffic {
         let reads = &mut self.reads[stage as usize][structure as usize];
         reads.requests += 1;
         reads.bytes += bytes as u64;
+    }
+
+    /// Counts written bytes.
+    #[expect(clippy::indexing_slicing, reason = "structures number the elements")]
+    pub(super) fn count_written(&mut self, structure: Structure, bytes: u64) {
+        self.written[structure as usize] += bytes;
+    }
+
+    /// Number of bytes written of the structures for which `chosen` returns true.
+    pub fn written_bytes(&self, chosen: impl Fn(Structure) -> bool) -> u64 {
+        let of_structures = Structure::ALL.into_iter().zip(self.written);
+        of_structures.filter(|&(structure, _)| chosen(structure)).map(|(_, bytes)| bytes).sum()
     }
 
     /// Counts a miss of the cache between the chip and this memory.

@@ -1,6 +1,6 @@
 //! Test of card memory. Each pattern is written over the whole memory and read back.
 
-use photoncard_shared::address::{LINE_BYTES, Line, LineAddress};
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{
     Fault, FaultCode, MemoryPattern, MemoryTest, WORDS_PER_LINE, WrongWord, WrongWords,
 };
@@ -94,7 +94,7 @@ impl MemoryTester {
         for address in written..end {
             match pattern {
                 MemoryPattern::ByteLanes => replace_bytes(memory, address),
-                pattern => memory.write(LineAddress(address), &[line(pattern, address)]),
+                pattern => memory.write(Structure::Header, LineAddress(address), &[line(pattern, address)]),
             }
             .ok_or_else(|| outside(LineAddress(address)))?;
         }

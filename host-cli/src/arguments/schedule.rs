@@ -51,6 +51,8 @@ impl ScheduleOptions {
         add(bins.is_some() && !order.has_bins(), "--bins", &no_bins);
         add(queue.is_some() && !order.has_queue(), "--queue", &no_queue);
         add(in_flight.is_some() && !order.has_queue(), "--in-flight", &no_queue);
+        let in_memory = "with --order buckets, by which as many tiles wait as card memory has room for";
+        add(in_flight.is_some() && *order == GatherOrder::Buckets, "--in-flight", in_memory);
     }
 
     pub(super) fn settings(&self) -> Schedule {

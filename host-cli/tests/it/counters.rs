@@ -38,9 +38,11 @@ fn check_sums(statistics: &Value) {
     let stages = ["eye", "survey", "table", "shadow", "gather_ray", "gather", "caustic"];
     for key in KEYS {
         let halves = ["photon_map", "scene"].map(|half| count(statistics, half, key));
+        let waiting = count(statistics, "waiting", key);
         assert_eq!(sum(statistics, "structures", &photon_map, key), halves[0], "{key}");
         assert_eq!(sum(statistics, "structures", &scene, key), halves[1], "{key}");
-        assert_eq!(sum(statistics, "stages", &stages, key), halves[0] + halves[1], "{key}");
+        assert_eq!(sum(statistics, "structures", &["waiting"], key), waiting, "{key}");
+        assert_eq!(sum(statistics, "stages", &stages, key), halves[0] + halves[1] + waiting, "{key}");
         assert!(halves.iter().all(|&half| half > 0), "{key}: {halves:?}");
     }
     for half in ["photon_map", "scene"] {
@@ -97,10 +99,13 @@ fn counters_add_up_and_change_no_picture() {
 fn the_figures_of_the_document_on_memory_are_of_this_program() {
     let csv = include_str!("../../../docs/memory.csv");
     let row: Vec<&str> = csv.lines().nth(1).expect("a row").split(',').collect();
-    let [scene, rays, "emulated", "48", photon_map, geometry, program] = row[..] else { panic!("{row:?}") };
+    let [scene, rays, "emulated", "48", order, photon_map, geometry, waiting, program] = row[..] else {
+        panic!("{row:?}")
+    };
     assert!(program.starts_with("photoncard "), "{row:?}");
     let room = Room::new();
-    let options = ["--quality", "paper", "--size", "48x48", "--aov", "none", "--gather-rays", rays];
+    let options =
+        ["--quality", "paper", "--size", "48x48", "--aov", "none", "--gather-rays", rays, "--order", order];
     let techniques =
         ["--irradiance-cache", "on", "--ic-error", "0.025", "--counters", "--card", "emulated:1"];
     let outputs = ["-o", "out.exr", "--stats", "stats.json"];
@@ -110,6 +115,9 @@ fn the_figures_of_the_document_on_memory_are_of_this_program() {
     let statistics = statistics(&room, "stats.json");
     let bytes = ["photon_map", "scene"].map(|part| count(&statistics, part, "dram_bytes").to_string());
     assert_eq!(bytes, [photon_map, geometry], "run tests/memory_figures.sh");
+    let written = statistics.pointer("/memory/tile_written_bytes").and_then(Value::as_u64).expect("a count");
+    let both = count(&statistics, "waiting", "dram_bytes") + written;
+    assert_eq!(both.to_string(), waiting, "run tests/memory_figures.sh");
 }
 
 #[test]
@@ -117,9 +125,13 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     room.rendered("scene.gltf", &["-o", "plain.exr", "--tile", "4"]);
-    for (card, layout) in [("emulated:1", "jensen"), ("emulated-micro:1", "lines")] {
+    for (card, layout, order, begun) in [
+        ("emulated:1", "jensen", "sort", 4..5),
+        ("emulated-micro:1", "lines", "sort", 4..5),
+        ("emulated:1", "lines", "buckets", 1..5),
+    ] {
         let files = ["-o", "a.exr", "--stats", "a.json", "--trace", "a.din.gz"];
-        let options = ["--card", card, "--photon-map", layout, "--tile", "4", "--quiet"];
+        let options = ["--card", card, "--photon-map", layout, "--tile", "4", "--order", order, "--quiet"];
         let outcome = room.rendered("scene.gltf", &[&files[..], &options].concat());
         assert_eq!(outcome.stderr, "");
         assert!(room.read("a.exr") == room.read("plain.exr"));
@@ -128,16 +140,24 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
         let text = io::read_to_string(GzDecoder::new(&*room.read("a.din.gz"))).unwrap();
         assert!(text.starts_with("4 0\n") && text.ends_with('\n'));
         let image_bytes = statistics["image_bytes"].as_u64().unwrap();
-        let [mut requests, mut tiles] = [0_u64; 2];
+        let [mut requests, mut waiting, mut written, mut tiles] = [0_u64; 4];
         for line in text.lines() {
-            match line.split_once(' ').unwrap() {
-                ("4", "0") => tiles += 1,
-                ("0", address) if u64::from_str_radix(address, 16).unwrap() < image_bytes => requests += 1,
+            let (label, address) = line.split_once(' ').unwrap();
+            let is_of_image = u64::from_str_radix(address, 16).unwrap() < image_bytes;
+            match (label, is_of_image) {
+                ("4", _) if address == "0" => tiles += 1,
+                ("0", true) => requests += 1,
+                ("0", false) => waiting += 1,
+                ("1", false) => written += 1,
                 _ => panic!("{line}"),
             }
         }
         let counted = ["photon_map", "scene"].map(|half| count(&statistics, half, "requests"));
-        assert_eq!((tiles, requests), (4, counted[0] + counted[1]));
+        assert_eq!(requests, counted[0] + counted[1]);
+        assert!(begun.contains(&tiles), "{tiles}");
+        assert_eq!(waiting, count(&statistics, "waiting", "requests"));
+        assert_eq!(waiting, written, "each line that waits is read once");
+        assert_eq!(statistics["memory"]["tile_written_bytes"], 128 * written);
     }
 }
 

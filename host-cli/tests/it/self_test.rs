@@ -21,7 +21,7 @@ impl MemoryPort for StuckLine {
         Ok(&self.0[address.0 as usize])
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         for (target, line) in self.0[first.0 as usize..].iter_mut().zip(lines) {
             target.0 = *line;
             target.0.iter_mut().step_by(4).for_each(|byte| *byte |= 0x10);

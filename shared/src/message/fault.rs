@@ -80,6 +80,8 @@ pub enum Invariant {
     Bundle,
     /// A reply must have room for each pixel, checksum or result that is added to it.
     Reply,
+    /// Card memory must have room for all lines of gathers, results and blocks for which it was reserved.
+    Room,
 }
 
 impl Invariant {

@@ -149,6 +149,15 @@ impl FrameParameters {
             if self.adaptive_threshold.is_some() { (MAX_PATHS, PROBES) } else { (1, 0) };
         u64::from(self.samples) * u64::from(of_sample) + u64::from(probes)
     }
+
+    /// Maximum number of tiles that a chip holds, waiting or in flight: [`Budget::tiles`], or
+    /// [`Budget::waiting_blocks`] if that is more and gathers wait in card memory.
+    pub const fn tiles_of(&self, budget: &Budget) -> u32 {
+        match self.drain {
+            Drain::Buckets if budget.waiting_blocks > budget.tiles => budget.waiting_blocks,
+            _ => budget.tiles,
+        }
+    }
 }
 
 /// Pixel filter: the probability density of a pixel's samples on each axis. Samples are drawn from the filter
@@ -216,6 +225,10 @@ pub enum Drain {
     /// Gathers are queued. When the queue is full or no other work is left, they are done in the order of a
     /// Hilbert curve.
     Sort,
+    /// Gathers of many tiles wait in card memory after the card image, in buckets along a Hilbert curve, and
+    /// so do the blocks that wait for them. When there is no room or no other work is left, the buckets are
+    /// read back one after another, and their gathers are done in the order of the curve.
+    Buckets,
 }
 
 /// A rectangle of the picture.

@@ -34,12 +34,11 @@ int main(int argc, char** argv) {
     if (argc != 4) fail("usage: replay CONFIG FOLDER IN_FLIGHT <TRACE");
     const std::string folder = argv[2];
     const uint64_t most = std::strtoull(argv[3], nullptr, 10);
-    if (most == 0) fail("IN_FLIGHT is a number of reads, at least 1");
+    if (most == 0) fail("IN_FLIGHT is a number of transactions, at least 1");
 
     uint64_t issued = 0, answered = 0, clock = 0, last = 0;
     auto answer = [&](uint64_t) { ++answered; last = clock; };
-    auto written = [](uint64_t) { fail("a trace of tiles has no writes"); };
-    dramsim3::MemorySystem memory(argv[1], folder, answer, written);
+    dramsim3::MemorySystem memory(argv[1], folder, answer, answer);
 
     std::ios::sync_with_stdio(false);
     std::string address, operation, cycle;
@@ -48,12 +47,13 @@ int main(int argc, char** argv) {
         if (!has_ended && !is_waiting) {
             is_waiting = static_cast<bool>(std::cin >> address >> operation >> cycle);
             has_ended = !is_waiting;
-            if (is_waiting && operation != "READ") fail("no line of a trace: " + address + " " + operation + " " + cycle);
+            if (is_waiting && operation != "READ" && operation != "WRITE") fail("no line of a trace: " + address + " " + operation + " " + cycle);
         }
         if (is_waiting && issued - answered < most) {
             const uint64_t place = std::strtoull(address.c_str(), nullptr, 16);
-            if (memory.WillAcceptTransaction(place, false)) {
-                memory.AddTransaction(place, false);
+            const bool is_write = operation == "WRITE";
+            if (memory.WillAcceptTransaction(place, is_write)) {
+                memory.AddTransaction(place, is_write);
                 ++issued;
                 is_waiting = false;
             }
@@ -65,7 +65,8 @@ int main(int argc, char** argv) {
 
     std::ifstream file(folder + "/dramsim3.json");
     const auto statistics = nlohmann::json::parse(file);
-    if (sum(statistics, "num_reads_done") != static_cast<double>(issued)) fail("DRAMsim3 counts other reads than it was given");
+    const double done = sum(statistics, "num_reads_done") + sum(statistics, "num_writes_done");
+    if (done != static_cast<double>(issued)) fail("DRAMsim3 counts other transactions than it was given");
     std::cout << issued << ' ' << static_cast<double>(last) * memory.GetTCK() << ' '
               << sum(statistics, "num_read_row_hits") << ' ' << sum(statistics, "total_energy") << std::endl;
 }

@@ -70,12 +70,12 @@ fn frame(choice: u8) -> FrameParameters {
             [usize::from(choice >> 1 & 3)],
         irradiance_error: is_set(3).then_some(0.2),
         bins: if is_set(4) { 8 } else { 1 },
-        drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Sort][usize::from(choice >> 5 & 3)],
+        drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Buckets][usize::from(choice >> 5 & 3)],
         filter: [Filter::Box, Filter::Gaussian, Filter::BlackmanHarris][usize::from(choice % 3)],
         queue: if is_set(7) { 3 } else { 64 },
         caustics: choice.is_multiple_of(3).then_some(CausticGather { neighbors: 10, max_distance: 0.3 }),
         layers: choice.count_ones() % 2 == 1,
-        radiance: if choice >> 5 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
+        radiance: if choice >> 4 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
         ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
     }
 }

@@ -116,13 +116,13 @@ fn a_read_after_a_write_returns_the_written_line() {
     for value in 1..4 {
         for structure in [Structure::Photons, Structure::Nodes] {
             for first in [0, 5] {
-                memory.write(LineAddress(first), &[[value; LINE_BYTES]; 2]).unwrap();
+                memory.write(Structure::Header, LineAddress(first), &[[value; LINE_BYTES]; 2]).unwrap();
                 let read = memory.read(structure, LineAddress(first + 1), 0..128).unwrap();
                 assert_eq!(read.0, [value; LINE_BYTES]);
             }
         }
     }
-    assert!(memory.write(LineAddress(7), &[[0; LINE_BYTES]; 2]).is_none());
+    assert!(memory.write(Structure::Header, LineAddress(7), &[[0; LINE_BYTES]; 2]).is_none());
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn a_write_and_a_kept_record_take_the_place_of_no_other_line() {
     let fetched =
         |memory: &LineCaches<Counted<Dram>, _, _>| memory.below().traffic().sum(|_, _| true).requests;
     assert_eq!(fetched(&memory), 8);
-    memory.write(LineAddress(20), &[[7; LINE_BYTES]]).unwrap();
+    memory.write(Structure::IrradianceRecords, LineAddress(20), &[[7; LINE_BYTES]]).unwrap();
     for _ in 0..2 {
         let kept = memory.read(Structure::IrradianceRecords, LineAddress(20), 0..128).unwrap();
         assert_eq!(kept.0, [7; LINE_BYTES]);
@@ -156,7 +156,7 @@ impl MemoryPort for Growing {
         self.0.get(address.0 as usize).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         self.0.truncate(first.0 as usize);
         self.0.extend(lines.iter().map(|line| Line(*line)));
         Some(())
@@ -168,7 +168,7 @@ fn lines_are_read_from_a_memory_that_grows() {
     let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
     let mut memory = LineCaches::unified(Growing(Vec::new()), cache(shape));
     for value in 0..20 {
-        memory.write(LineAddress(value), &[[value as u8; LINE_BYTES]]).unwrap();
+        memory.write(Structure::Header, LineAddress(value), &[[value as u8; LINE_BYTES]]).unwrap();
         for address in 0..value + 3 {
             let read = memory.read(Structure::Nodes, LineAddress(address), 0..128).map(|line| line.0[0]);
             let expected = (address <= value).then_some(address as u8);

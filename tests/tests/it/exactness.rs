@@ -46,7 +46,7 @@ fn sums(film: &Film) -> Vec<PixelSums> {
 
 /// Settings that no pixel may depend on.
 fn variants() -> Vec<RenderSettings> {
-    use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
+    use GatherOrder::{Buckets, DirectionBins, Hash, Naive, Sort, Tiled};
     let tile = 16;
     let schedules = [
         (tile, Naive, None, None),
@@ -60,6 +60,8 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hash, None, None),
         (9, Sort, None, Some(1)),
         (tile, Sort, Some(3), Some(2)),
+        (7, Buckets, None, None),
+        (64, Buckets, Some(5), Some(300)),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
         schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None, ..Schedule::default() },
@@ -69,6 +71,7 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated:2"][..], tile, Tiled, None),
         (&["emulated:3"], tile, Hash, Some(37)),
         (&["emulated-micro:2"], tile, Sort, Some(1000)),
+        (&["emulated-micro:2", "emulated-large:1"], 6, Buckets, None),
         (&["emulated:7"], tile, Sort, None),
         (&["emulated:3"], tile, Naive, None),
         (&["emulated-large:1"], 6, Sort, None),
@@ -142,9 +145,9 @@ fn layer_sums(film: &Film) -> Vec<LayerSums> {
 }
 
 /// Gather orders that chips have.
-const CHIPS_ORDERS: [GatherOrder; 5] = {
-    use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
-    [Naive, Tiled, DirectionBins, Hash, Sort]
+const CHIPS_ORDERS: [GatherOrder; 6] = {
+    use GatherOrder::{Buckets, DirectionBins, Hash, Naive, Sort, Tiled};
+    [Naive, Tiled, DirectionBins, Hash, Sort, Buckets]
 };
 
 /// A tile of 64x64 pixels has more gather points than a chip holds: its gather rays are cast in two stripes.
@@ -165,6 +168,7 @@ fn tiles_with_more_pixels_than_gather_points_are_exact() {
         let expected = picture(16, GatherOrder::Tiled, "emulated-micro:2");
         for (order, cards) in [
             (GatherOrder::Sort, "emulated:1"),
+            (GatherOrder::Buckets, "emulated:1"),
             (GatherOrder::DirectionBins, "emulated:1"),
             (GatherOrder::Naive, "emulated-large:1"),
         ] {
@@ -301,6 +305,8 @@ fn more_records_than_a_chip_has_room_for_are_exact() {
     let expected = sums(&render_or_panic(&scene, &settings(4, GatherOrder::Sort, "emulated:2")).film);
     for (tile, order, cards) in [
         (64, GatherOrder::Sort, "emulated:1"),
+        (64, GatherOrder::Buckets, "emulated:1"),
+        (16, GatherOrder::Buckets, "emulated-micro:2"),
         (61, GatherOrder::DirectionBins, "emulated:2"),
         (16, GatherOrder::Naive, "emulated-micro:2"),
     ] {

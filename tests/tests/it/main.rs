@@ -48,4 +48,5 @@ mod settings;
 mod specular;
 mod study_figures;
 mod textures;
+mod waiting;
 mod wide_ground;

@@ -76,22 +76,24 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
 /// Rows of the table in `docs/memory.md`: bytes per frame, the factor below the naive order, and the program.
 fn memory_table(csv: &str) -> Vec<String> {
     let rows = csv.lines().skip(1).map(|line| {
-        let fields = <[&str; 7]>::try_from(line.split(',').collect::<Vec<_>>()).expect("seven fields");
-        let [scene, rays, card, side, photons, geometry, program] = fields;
-        let bytes = [photons, geometry].map(|bytes| bytes.parse::<f64>().expect("a number of bytes"));
-        ((scene, rays, card, side), bytes, program)
+        let fields = <[&str; 9]>::try_from(line.split(',').collect::<Vec<_>>()).expect("nine fields");
+        let [scene, rays, card, side, order, photons, geometry, waiting, program] = fields;
+        let bytes =
+            [photons, geometry, waiting].map(|bytes| bytes.parse::<f64>().expect("a number of bytes"));
+        ((scene, rays, card, order, side), bytes, program)
     });
     let frames: Vec<_> = rows.filter(|((.., side), ..)| *side == "512").collect();
     let naive = |of: &str| {
-        let row = frames.iter().find(|((scene, _, card, _), ..)| *scene == of && *card == "naive");
+        let row = frames.iter().find(|((scene, _, _, order, _), ..)| *scene == of && *order == "naive");
         row.map(|(_, bytes, _)| bytes.iter().sum::<f64>()).expect("a naive frame of each scene")
     };
     frames
         .iter()
-        .map(|((scene, rays, card, _), bytes, program)| {
-            let [photons, geometry] = bytes.map(|bytes| format!("{:.1}", bytes / 1e6));
+        .map(|((scene, rays, card, order, _), bytes, program)| {
+            let [photons, geometry, waiting] = bytes.map(|bytes| format!("{:.1}", bytes / 1e6));
             let times = naive(scene) / bytes.iter().sum::<f64>();
-            format!("| {scene}, {rays} | `{card}` | {photons} | {geometry} | {times:.0} | {program} |")
+            let of_bytes = format!("{photons} | {geometry} | {waiting}");
+            format!("| {scene}, {rays} | `{card}` | `{order}` | {of_bytes} | {times:.0} | {program} |")
         })
         .collect()
 }
@@ -123,8 +125,7 @@ fn the_table_of_qualities_follows_from_its_csv() {
 
 #[test]
 fn the_table_of_memory_follows_from_its_csv() {
-    const HEADING: &str =
-        "| scene, gather rays | `--card` | photon map, MB | scene, MB | times less | program |";
+    const HEADING: &str = "| scene, gather rays | `--card` | `--order` | photon map, MB | scene, MB | waiting, MB | times less | program |";
     check_table("memory.md", HEADING, &memory_table(&csv("memory.csv")));
 }
 

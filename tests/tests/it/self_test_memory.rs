@@ -122,7 +122,7 @@ impl MemoryPort for DefectiveMemory {
         Ok(&self.shown[address.0 as usize])
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let words = lines.as_flattened().as_chunks().0;
         for (index, bytes) in (first.0 * WORDS_PER_LINE..).zip(words) {
             self.store(index, u32::from_le_bytes(*bytes));
@@ -281,7 +281,7 @@ fn a_memory_without_its_lines_is_a_fault() {
             Err(Fault { code: FaultCode::LineRange, detail: address.0 })
         }
 
-        fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
             self.0.get_mut(first.0 as usize..first.0 as usize + lines.len()).map(drop)
         }
     }

@@ -53,6 +53,11 @@ impl Scheduler {
     /// tiles only while enough tiles wait for the other cards. Without this limit, tiles would wait behind a
     /// slow tile, and near the end idle cards could not take them.
     fn has_share(&self, card: CardNumber) -> bool {
+        if self.deals_shares {
+            let dealt: usize = self.living().map(|other| self.cards[other].tiles.len()).sum();
+            let share = (self.waiting_anywhere() + dealt).div_ceil(self.living().count().max(1));
+            return self.cards[card].tiles.len() < share;
+        }
         let others = self.living().filter(|&other| other != card).count();
         self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
     }

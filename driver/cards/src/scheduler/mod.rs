@@ -71,6 +71,7 @@ pub struct Scheduler {
     set_apart: Vec<usize>,
     cards: Vec<Card>,
     has_helpers: bool,
+    deals_shares: bool,
     /// Time before which no tile can be due for duplication.
     next_help: Duration,
     /// Time since which no card can continue an incomplete render; `None` while a card can.
@@ -119,6 +120,7 @@ impl Scheduler {
             set_apart: Vec::new(),
             cards: (0..cards).map(|_| Card::new()).collect(),
             has_helpers: false,
+            deals_shares: false,
             next_help: Duration::ZERO,
             stuck_since: None,
             times: TileTimes::default(),
@@ -132,6 +134,13 @@ impl Scheduler {
     #[must_use]
     pub fn with_helpers(self) -> Self {
         Self { has_helpers: true, ..self }
+    }
+
+    /// Gives each card its share of the tiles at once, as far as it accepts them, instead of a few at a time:
+    /// a card whose gathers wait in card memory reads less the more tiles it has.
+    #[must_use]
+    pub fn in_shares(self) -> Self {
+        Self { deals_shares: true, ..self }
     }
 
     /// Requires that a second card verify a share (0 to 1) of the tiles, at least one tile. A hash of seed

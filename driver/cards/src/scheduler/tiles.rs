@@ -20,6 +20,9 @@ pub enum GatherOrder {
     /// Rays by direction bins. Gathers wait in the chip's queue, and are done in order along a Hilbert curve.
     #[default]
     Sort,
+    /// Rays by direction bins. Gathers of many tiles wait in card memory, and are done in order along a
+    /// Hilbert curve.
+    Buckets,
 }
 
 choices!(GatherOrder {
@@ -28,6 +31,7 @@ choices!(GatherOrder {
     DirectionBins = "dirbin": "Rays of one direction bin for all pixels of a tile, then of the next bin",
     Hash = "hash": "By direction bins; gathers wait and are sorted by a spatial hash of their positions",
     Sort = "sort": "By direction bins; gathers wait and are sorted along a Hilbert curve",
+    Buckets = "buckets": "As sort, but gathers of many tiles wait in card memory",
 });
 
 impl GatherOrder {
@@ -37,12 +41,13 @@ impl GatherOrder {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
             Self::Hash => Drain::Hash,
             Self::Sort => Drain::Sort,
+            Self::Buckets => Drain::Buckets,
         }
     }
 
     /// Returns whether gathers wait in a chip's queue.
     pub fn has_queue(self) -> bool {
-        matches!(self, Self::Hash | Self::Sort)
+        matches!(self, Self::Hash | Self::Sort | Self::Buckets)
     }
 
     /// Returns whether rays are cast by direction bins.

@@ -27,7 +27,7 @@ use std::time::Duration;
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
-use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
+use photoncard_shared::message::{self, Command, Drain, MemoryUse, OPERAND_BYTES};
 use photoncard_shared::transport::Event as LineEvent;
 
 use self::channel::Channel;
@@ -40,7 +40,7 @@ use self::upload::{Comparison, Load};
 
 /// Maximum number of unanswered tiles of a card, whatever its budget. If the card is lost, all of them are
 /// delayed.
-const MAX_CREDITS: u32 = 16;
+const MAX_CREDITS: u32 = 64;
 
 /// Session with one card.
 pub struct Session {
@@ -181,8 +181,14 @@ impl Session {
 
     /// Returns whether the card accepts another tile and the send window has room for a command.
     pub fn wants_tile(&self) -> bool {
-        let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
-        self.is_loaded() && self.tiles.len() < credits && self.channel.is_free()
+        self.is_loaded() && self.tiles.len() < self.credits() && self.channel.is_free()
+    }
+
+    /// Maximum number of unanswered tiles.
+    fn credits(&self) -> usize {
+        let Some(budget) = &self.budget else { return 1 };
+        let of_card = self.job.as_ref().map_or(budget.tiles, |job| job.frame.tiles_of(budget));
+        of_card.min(MAX_CREDITS) as usize
     }
 
     /// Assigns a tile to the card. [`Self::wants_tile`] must be true.
@@ -203,7 +209,11 @@ impl Session {
     /// Maximum number of tiles that the card works on at once.
     fn at_work(&self) -> usize {
         let of_card = self.budget.map_or(1, |budget| budget.in_flight);
-        self.job.as_ref().map_or(of_card, |job| of_card.min(job.frame.in_flight)) as usize
+        match &self.job {
+            Some(job) if job.frame.drain == Drain::Buckets => self.credits(),
+            Some(job) => of_card.min(job.frame.in_flight) as usize,
+            None => of_card as usize,
+        }
     }
 
     /// Statistics of the link so far.

@@ -13,8 +13,8 @@ use photoncard_firmware::kind::{
 };
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::{
-    Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, SUMS_WITH_LAYERS,
-    gather_candidates,
+    Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS,
+    MAX_WAITING_POINTS, SUMS_WITH_LAYERS, gather_buckets, gather_candidates,
 };
 use serde_json::{Value, json};
 
@@ -30,7 +30,7 @@ pub const MIN_DRAM_BYTES: u64 = 1 << 20;
 
 /// Names and ranges of the capacities in a file. A capacity that the file does not state is that of the
 /// reference chip.
-const RANGES: [(&str, RangeInclusive<u64>); 15] = [
+const RANGES: [(&str, RangeInclusive<u64>); 16] = [
     ("sram_bytes", 1..=MAX_SRAM),
     ("dram_bytes", MIN_DRAM_BYTES..=MAX_DRAM_BYTES),
     ("photon_cache_bytes", 1..=MAX_SRAM),
@@ -45,6 +45,7 @@ const RANGES: [(&str, RangeInclusive<u64>); 15] = [
     ("samples", 1..=REFERENCE.samples as u64),
     ("tiles", 1..=MAX_TILES as u64),
     ("in_flight", 1..=MAX_IN_FLIGHT as u64),
+    ("waiting_blocks", 0..=MAX_WAITING_BLOCKS as u64),
     ("gather_points", MIN_RECORDS as u64..=MAX_TILE_PIXELS as u64),
 ];
 
@@ -134,6 +135,7 @@ impl Emulated {
     fn check(&self) -> Result<(), ChipError> {
         let Budget { photon_cache_bytes, scene_cache_bytes, irradiance_records, in_flight, tiles, .. } =
             self.budget;
+        let Budget { waiting_blocks, tile_pixels, gather_queue, .. } = self.budget;
         let contradictory =
             |name, value, rule: &str| Err(ChipError::Contradictory { name, value, rule: rule.to_owned() });
         for (name, bytes) in
@@ -148,6 +150,15 @@ impl Emulated {
         }
         if in_flight > tiles {
             return contradictory("in_flight", in_flight, &format!("at most {tiles}, the number of tiles"));
+        }
+        let points = tile_pixels.max(irradiance_records);
+        if waiting_blocks > 0 && points > MAX_WAITING_POINTS {
+            let rule = format!("0, or at most {MAX_WAITING_POINTS} tile_pixels and irradiance_records");
+            return contradictory("waiting_blocks", waiting_blocks, &rule);
+        }
+        if waiting_blocks > 0 && gather_buckets(gather_queue) == 0 {
+            let rule = "0, or a gather_queue of 5 gathers or more";
+            return contradictory("waiting_blocks", waiting_blocks, rule);
         }
         if self.points < irradiance_records as usize {
             let rule = format!("at least {irradiance_records}, the number of irradiance_records");
@@ -178,9 +189,11 @@ impl Emulated {
     /// flight.
     fn sizes(&self) -> [usize; 4] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
+        let blocks = self.budget.waiting_blocks as usize;
         let [pixels, queue, records, flights] =
             [tile_pixels, gather_queue, irradiance_records, in_flight].map(|entries| entries as usize);
-        let entries = [pixels, gather_candidates(neighbors), queue, records, self.points];
+        let buckets = if blocks == 0 { 0 } else { gather_buckets(gather_queue) };
+        let entries = [pixels, gather_candidates(neighbors), queue, records, self.points, buckets, blocks];
         let [one, two] = [extrapolated(&entries, &probes::<1>()), extrapolated(&entries, &probes::<2>())];
         std::array::from_fn(|i| {
             let bytes = one[i] + (two[i] - one[i]) * (flights as i64 - 1);
@@ -195,8 +208,8 @@ const ALIGNMENT: usize = 8;
 const PROBED: usize = 64;
 
 /// Extrapolates sizes linearly to buffers with the numbers of entries `entries`. The second argument has the
-/// sizes of the smallest probe, then of five probes that each have twice as many entries in one buffer.
-fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
+/// sizes of the smallest probe, then of seven probes that each have twice as many entries in one buffer.
+fn extrapolated(entries: &[usize; 7], [base, doubled @ ..]: &[[usize; 4]; 8]) -> [i64; 4] {
     std::array::from_fn(|i| {
         let size = |sizes: &[usize; 4]| sizes[i] as i64;
         let slopes = doubled.iter().map(|sizes| size(sizes) - size(base));
@@ -207,16 +220,18 @@ fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) ->
 
 /// Sizes of the smallest probe with `FLIGHTS` tiles in flight, and of probes with twice as many entries of
 /// one buffer.
-const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 6] {
+const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 8] {
     const ONE: usize = PROBED;
     const TWO: usize = 2 * PROBED;
     [
-        sizes_of::<Probe<ONE, ONE, ONE, ONE, ONE, FLIGHTS>>(),
-        sizes_of::<Probe<TWO, ONE, ONE, ONE, ONE, FLIGHTS>>(),
-        sizes_of::<Probe<ONE, TWO, ONE, ONE, ONE, FLIGHTS>>(),
-        sizes_of::<Probe<ONE, ONE, TWO, ONE, ONE, FLIGHTS>>(),
-        sizes_of::<Probe<ONE, ONE, ONE, TWO, ONE, FLIGHTS>>(),
-        sizes_of::<Probe<ONE, ONE, ONE, ONE, TWO, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<TWO, ONE, ONE, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, TWO, ONE, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, TWO, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, TWO, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, TWO, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, ONE, TWO, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, ONE, ONE, TWO, FLIGHTS>>(),
     ]
 }
 
@@ -226,17 +241,21 @@ const fn sizes_of<K: FixedKind>() -> [usize; 4] {
 }
 
 /// Kind of chip that is measured by `size_of` and never built. The parameters are the numbers of pixels,
-/// candidates, gathers, irradiance records, gather points and tiles in flight.
-struct Probe<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize>;
+/// candidates, gathers, irradiance records, gather points, buckets, waiting blocks and tiles in flight.
+#[rustfmt::skip]
+struct Probe<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const B: usize, const W: usize, const F: usize>;
 
-impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize> ChipKind
-    for Probe<T, C, G, R, P, F>
+#[rustfmt::skip]
+impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const B: usize, const W: usize, const F: usize>
+    ChipKind for Probe<T, C, G, R, P, B, W, F>
 {
     type TilePixels = Entries<T>;
     type Candidates = Entries<C>;
     type GatherQueue = Entries<G>;
     type IrradianceRecords = Entries<R>;
     type Points = Entries<P>;
+    type Buckets = Entries<B>;
+    type WaitingBlocks = Entries<W>;
     type Flights = Entries<F>;
 
     fn budget(&self) -> &Budget {
@@ -244,8 +263,9 @@ impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: us
     }
 }
 
-impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize> FixedKind
-    for Probe<T, C, G, R, P, F>
+#[rustfmt::skip]
+impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const B: usize, const W: usize, const F: usize>
+    FixedKind for Probe<T, C, G, R, P, B, W, F>
 {
     const KIND: Self = Self;
     const BUDGET: Budget = REFERENCE;
@@ -291,6 +311,8 @@ mod tests {
             (r#"{"scene_cache_bytes": 1000}"#, ["scene_cache_bytes is 1000", "multiple of 512"]),
             (r#"{"irradiance_records": 100}"#, ["irradiance_records is 100", "power of two"]),
             (r#"{"in_flight": 5}"#, ["in_flight is 5", "at most 4"]),
+            (r#"{"tile_pixels": 8192}"#, ["waiting_blocks is 64", "at most 4096"]),
+            (r#"{"gather_queue": 4}"#, ["waiting_blocks is 64", "5 gathers"]),
             (r#"{"gather_points": 256}"#, ["gather_points is 256", "at least 512"]),
             (r#"{"gather_queue": 1000000}"#, ["sram_bytes is 1048576", "buffers, caches and stack"]),
         ] {

@@ -103,7 +103,8 @@ impl Contents {
             Structure::Header
             | Structure::Attributes
             | Structure::Textures
-            | Structure::IrradianceRecords => {}
+            | Structure::IrradianceRecords
+            | Structure::Waiting => {}
         }
     }
 }
@@ -147,8 +148,8 @@ impl<M: MemoryPort> MemoryPort for Inspected<M> {
         Ok(line)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(structure, first, lines)
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind::ChipKind;
-use photoncard_firmware::memory::MemoryPort;
+use photoncard_firmware::memory::{CardMemory, MemoryPort};
 use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_map::pack::CardImage;
@@ -106,9 +106,12 @@ pub fn render_tiles_in_flight(
     take: &mut dyn FnMut(&Tile, RenderedTile) -> bool,
 ) -> Result<MemoryTraffic, Fault> {
     let (scene, lines) = image.view();
-    let mut memory = Measured::new(caches.over(lines));
+    let chip = &mut kind.emulated().chip();
+    let dram = EmulatedDram::lent(lines, kind.budget().dram_bytes);
+    chip.begin_frame(frame, scene.header.lines..dram.lines());
+    let mut memory = Measured::new(caches.over(dram));
     let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
-    render_tiles(&mut kind.emulated().chip(), job, tiles, take)?;
+    render_tiles(chip, job, tiles, take)?;
     Ok(memory.traffic())
 }
 
@@ -126,7 +129,7 @@ pub fn render_tile_of(
 ) -> Result<RenderedTile, Fault> {
     let (scene, lines) = image.view();
     match caches {
-        None => render_tile(chip, &scene, EmulatedDram::lent(lines), frame, tile, outlet),
+        None => render_tile(chip, &scene, EmulatedDram::lent(lines, 0), frame, tile, outlet),
         Some(caches) => render_tile(chip, &scene, Measured::new(caches.over(lines)), frame, tile, outlet),
     }
 }

@@ -48,8 +48,11 @@ pub(super) struct EmulatedDram<'a> {
 /// Stored lines, from line 0 to the last written one.
 enum Stored<'a> {
     Own(Vec<Line>),
-    /// Lines of a card image, borrowed until the first write.
-    Lent(&'a [Line]),
+    /// Lines of a card image, borrowed until one of them is written, and lines after them.
+    Lent {
+        image: &'a [Line],
+        beyond: Vec<Line>,
+    },
     /// The first `written` lines of an image, by reference, and lines after the whole image.
     Shared {
         image: Arc<CardImage>,
@@ -59,11 +62,13 @@ enum Stored<'a> {
 }
 
 impl<'a> EmulatedDram<'a> {
-    /// Creates a memory with the contents `lines`, which the first write copies.
-    pub(super) fn lent(Lines(lines): Lines<'a>) -> Self {
-        let limit = u32::try_from(lines.len()).unwrap_or(u32::MAX);
+    /// Creates a memory of `bytes` bytes, or as many as `image` needs, that begins with the lines of `image`.
+    /// The first write to one of these copies all.
+    pub(super) fn lent(Lines(image): Lines<'a>, bytes: u64) -> Self {
+        let lines = (bytes / LINE_BYTES as u64).max(image.len() as u64);
+        let limit = u32::try_from(lines).unwrap_or(u32::MAX);
         let (shared, held) = (SharedImage::default(), SharedImage::default());
-        Self { lines: Stored::Lent(lines), limit, shared, held }
+        Self { lines: Stored::Lent { image, beyond: Vec::new() }, limit, shared, held }
     }
 
     pub(super) fn new(bytes: u64, shared: SharedImage, held: SharedImage) -> Self {
@@ -93,7 +98,10 @@ impl<'a> EmulatedDram<'a> {
     #[inline(always)]
     fn get(&self, address: LineAddress) -> Option<&Line> {
         match &self.lines {
-            Stored::Lent(lines) => lines.get(address.0 as usize),
+            Stored::Lent { image, beyond } => {
+                let line = image.get(address.0 as usize);
+                line.or_else(|| beyond.get((address.0 as usize).checked_sub(image.len())?))
+            }
             Stored::Own(lines) => lines.get(address.0 as usize),
             Stored::Shared { image, written, beyond } => {
                 let line = image.lines().get(..*written)?.get(address.0 as usize);
@@ -108,7 +116,7 @@ impl<'a> EmulatedDram<'a> {
             return image.lines();
         }
         match &self.lines {
-            Stored::Lent(lines) => lines,
+            Stored::Lent { image, .. } => image,
             Stored::Own(lines) => lines,
             Stored::Shared { image, written, .. } => &image.lines()[..*written],
         }
@@ -145,13 +153,15 @@ impl<'a> EmulatedDram<'a> {
             }
             self.lines = Stored::Own(own);
         }
-        if let Stored::Lent(lines) = &self.lines {
-            self.lines = Stored::Own(lines.to_vec());
+        if let Stored::Lent { image, beyond } = &self.lines
+            && first < image.len()
+        {
+            self.lines = Stored::Own([image, &beyond[..]].concat());
         }
         match &mut self.lines {
             Stored::Shared { image, beyond, .. } => (beyond, first - image.lines().len()),
             Stored::Own(own) => (own, first),
-            Stored::Lent(_) => unreachable!("lent lines were copied"),
+            Stored::Lent { image, beyond } => (beyond, first - image.len()),
         }
     }
 }
@@ -170,7 +180,7 @@ impl MemoryPort for EmulatedDram<'_> {
         self.get(address)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         let first = first.0 as usize;
         first.checked_add(lines.len()).filter(|&end| end <= self.limit as usize)?;
         self.adopt();
@@ -234,7 +244,7 @@ mod tests {
     fn write(drams: &mut [EmulatedDram; 2], first: usize, lines: &[[u8; LINE_BYTES]]) {
         let address = LineAddress(first as u32);
         for dram in drams.iter_mut() {
-            assert_eq!(dram.write(address, lines), Some(()));
+            assert_eq!(dram.write(Structure::Header, address, lines), Some(()));
         }
         let [shared, own] = drams;
         for line in 0..own.all().len() as u32 + 2 {
@@ -301,7 +311,7 @@ mod tests {
         let last = lines - 1;
         assert_eq!(dram.read(Structure::Header, LineAddress(last), 0..1), Ok(&image.lines()[last as usize]));
         assert!(is_shared(&dram));
-        assert_eq!(dram.write(LineAddress(1), &[[7; LINE_BYTES]]), Some(()));
+        assert_eq!(dram.write(Structure::Header, LineAddress(1), &[[7; LINE_BYTES]]), Some(()));
         let mut expected = image.lines().to_vec();
         expected[1].0 = [7; LINE_BYTES];
         assert!(dram.all() == expected && !is_shared(&dram));
@@ -312,7 +322,7 @@ mod tests {
     fn lines_outside_the_memory_are_refused() {
         let mut dram =
             EmulatedDram::new(2 * LINE_BYTES as u64, SharedImage::default(), SharedImage::default());
-        assert_eq!(dram.write(LineAddress(1), &[[1; LINE_BYTES]; 2]), None);
+        assert_eq!(dram.write(Structure::Header, LineAddress(1), &[[1; LINE_BYTES]; 2]), None);
         assert!(dram.stored(LineAddress(0), 1).is_none());
     }
 }

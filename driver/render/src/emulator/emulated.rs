@@ -51,6 +51,8 @@ impl ChipKind for Emulated {
     type TilePixels = Heap;
     type Candidates = Heap;
     type GatherQueue = Heap;
+    type Buckets = Heap;
+    type WaitingBlocks = Heap;
     type IrradianceRecords = Heap;
     type Points = Heap;
     type Flights = Heap;

@@ -32,8 +32,8 @@ impl MemoryPort for Measured<'_> {
         self.0.read(structure, address, used)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.0.write(first, lines)
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.0.write(structure, first, lines)
     }
 
     #[inline(always)]

@@ -230,7 +230,7 @@ impl MemoryTraffic {
 
     /// Bytes of the scene fetched from DRAM for tiles.
     pub fn scene_bytes(&self) -> u64 {
-        self.fetched.of_tiles(|structure| !structure.is_photon_map()).bytes
+        self.fetched.of_tiles(Structure::is_scene).bytes
     }
 }
 

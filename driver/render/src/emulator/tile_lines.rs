@@ -48,8 +48,8 @@ impl<M: MeasuredMemory> MemoryPort for TileMeter<M> {
         self.memory.read(structure, address, used)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(structure, first, lines)
     }
 
     #[inline(always)]

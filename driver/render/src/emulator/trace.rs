@@ -2,11 +2,11 @@
 //! cache simulator, or below them, for a DRAM simulator.
 //!
 //! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
-//! blank, and a byte address in hexadecimal. Label 0 is a read of data. Label 4 is Dinero's escape that
-//! flushes its caches; it is written at the beginning of every tile with address 0. A labelled trace adds the
-//! structure, the stage and the number of bytes of the read to the line; Dinero ignores them. Below the
-//! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of
-//! `DRAMsim3`. See `docs/memory.md`.
+//! blank, and a byte address in hexadecimal. Label 0 is a read of data, label 1 a write of a line. Label 4 is
+//! Dinero's escape that flushes its caches; it is written at the beginning of every tile with address 0. A
+//! labelled trace adds the structure, the stage and the number of bytes of the read to the line; Dinero
+//! ignores them. Below the caches, each line of text is a fetch or a write of one line of card memory, in the
+//! format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
@@ -19,7 +19,7 @@ use flate2::write::GzEncoder;
 use photoncard_firmware::memory::Stage;
 use photoncard_picture::choice::{Choice, choices};
 use photoncard_picture::output::{OutputError, PendingFile};
-use photoncard_shared::address::Structure;
+use photoncard_shared::address::{LINE_BYTES, Structure};
 
 /// Size of the blocks in which the text is compressed, bytes.
 const BUFFER: usize = 64 << 10;
@@ -28,6 +28,7 @@ const BUFFER: usize = 64 << 10;
 const LONGEST_LINE: usize = 64;
 
 const READ: u8 = 0;
+const WRITE: u8 = 1;
 const FLUSH: u8 = 4;
 
 /// Format of a trace.
@@ -73,8 +74,8 @@ pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
     settings: TraceSettings,
-    /// Number of fetches written.
-    fetches: u64,
+    /// Number of fetches and writes below the caches that are in the trace.
+    accesses: u64,
     /// First failure. Nothing is written after it.
     error: Option<io::Error>,
     has_failed: Arc<AtomicBool>,
@@ -90,7 +91,7 @@ impl TraceFile {
             encoder: GzEncoder::new(PendingFile::create(&settings.path)?, Compression::fast()),
             buffer: Vec::with_capacity(BUFFER),
             settings: settings.clone(),
-            fetches: 0,
+            accesses: 0,
             error: None,
             has_failed: Arc::default(),
         })
@@ -109,7 +110,7 @@ impl TraceFile {
 
     pub(super) fn add_read(&mut self, address: u64, structure: Structure, stage: Stage, bytes: usize) {
         if self.is_below_caches() {
-            self.add_fetch(address);
+            self.add_access(address, false);
         } else if self.settings.has_labels {
             let (structure, stage) = (structure.name(), stage.name());
             self.add(format_args!("{READ} {address:x} {structure} {stage} {bytes}"));
@@ -118,14 +119,27 @@ impl TraceFile {
         }
     }
 
-    /// Adds a fetch of a line from DRAM.
-    fn add_fetch(&mut self, address: u64) {
-        let cycle = self.fetches;
-        match self.settings.format {
-            TraceFormat::Ramulator => self.add(format_args!("LD 0x{address:x}")),
-            _ => self.add(format_args!("0x{address:x} READ {cycle}")),
+    /// Adds a write of a line.
+    pub(super) fn add_write(&mut self, address: u64, structure: Structure, stage: Stage) {
+        if self.is_below_caches() {
+            self.add_access(address, true);
+        } else if self.settings.has_labels {
+            let (structure, stage) = (structure.name(), stage.name());
+            self.add(format_args!("{WRITE} {address:x} {structure} {stage} {LINE_BYTES}"));
+        } else {
+            self.add(format_args!("{WRITE} {address:x}"));
         }
-        self.fetches += 1;
+    }
+
+    /// Adds a fetch of a line from DRAM, or a write to it.
+    fn add_access(&mut self, address: u64, is_write: bool) {
+        let cycle = self.accesses;
+        let [ramulator, dramsim3] = if is_write { ["ST", "WRITE"] } else { ["LD", "READ"] };
+        match self.settings.format {
+            TraceFormat::Ramulator => self.add(format_args!("{ramulator} 0x{address:x}")),
+            _ => self.add(format_args!("0x{address:x} {dramsim3} {cycle}")),
+        }
+        self.accesses += 1;
     }
 
     /// Marks the beginning of a tile in the trace. A cache simulator empties its caches there.

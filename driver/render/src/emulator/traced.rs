@@ -1,4 +1,4 @@
-//! Memory whose reads are recorded in a trace.
+//! Memory whose reads and writes are recorded in a trace.
 
 use std::ops::Range;
 
@@ -9,17 +9,17 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Memory that records its reads for tiles in a trace, if there is one.
+/// Memory that records its reads and writes for tiles in a trace, if there is one.
 pub(super) struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,
     stage: Stage,
-    /// False before the first tile. Earlier reads are not recorded.
+    /// False before the first tile. Earlier ones are not recorded.
     in_tiles: bool,
 }
 
 impl<M> Traced<M> {
-    /// Wraps `memory` and records its reads in `trace`.
+    /// Wraps `memory` and records its reads and writes in `trace`.
     pub(super) fn new(memory: M, trace: Option<TraceFile>) -> Self {
         Self { memory, trace, stage: Stage::Begin, in_tiles: false }
     }
@@ -37,8 +37,14 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
         Ok(line)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
-        self.memory.write(first, lines)
+    fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+        self.memory.write(structure, first, lines)?;
+        if let Some(trace) = self.trace.as_mut().filter(|_| self.in_tiles && self.stage != Stage::Begin) {
+            for (line, _) in (u64::from(first.0)..).zip(lines) {
+                trace.add_write(line * LINE_BYTES as u64, structure, self.stage);
+            }
+        }
+        Some(())
     }
 
     #[inline(always)]
@@ -88,22 +94,29 @@ mod tests {
     use photoncard_firmware::memory::Lines;
 
     use super::*;
+    use crate::emulator::dram::EmulatedDram;
     use crate::emulator::trace::{TraceFormat, TraceSettings};
 
     #[test]
-    fn a_trace_has_a_flush_per_tile_and_the_lines_of_its_reads() {
+    fn a_trace_has_a_flush_per_tile_and_the_lines_of_its_reads_and_writes() {
         let folder = tempfile::tempdir().unwrap();
         use TraceFormat::{Dinero, Dramsim3, Ramulator};
         for (format, has_labels, used, expected) in [
-            (Dinero, false, 20..40, "4 0\n0 114\n4 0\n0 94\n"),
-            (Dinero, true, 20..40, "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n"),
-            (Ramulator, false, 0..128, "LD 0x100\nLD 0x80\n"),
-            (Dramsim3, false, 0..128, "0x100 READ 0\n0x80 READ 1\n"),
+            (Dinero, false, 20..40, "4 0\n0 114\n4 0\n0 94\n1 80\n"),
+            (
+                Dinero,
+                true,
+                20..40,
+                "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n1 80 waiting gather 128\n",
+            ),
+            (Ramulator, false, 0..128, "LD 0x100\nLD 0x80\nST 0x80\n"),
+            (Dramsim3, false, 0..128, "0x100 READ 0\n0x80 READ 1\n0x80 WRITE 2\n"),
         ] {
             let path = folder.path().join("trace.gz");
             let settings = TraceSettings { path, format, has_labels };
             let lines = [Line::ZERO; 3];
-            let mut memory = Traced::new(Lines(&lines), Some(TraceFile::create(&settings).unwrap()));
+            let dram = EmulatedDram::lent(Lines(&lines), 0);
+            let mut memory = Traced::new(dram, Some(TraceFile::create(&settings).unwrap()));
             memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
             for line in [2, 1] {
                 memory.begin_tile();
@@ -111,6 +124,7 @@ mod tests {
                 memory.read(Structure::Photons, LineAddress(line), used.clone()).unwrap();
                 memory.read(Structure::Photons, LineAddress(3), 0..20).unwrap_err();
             }
+            memory.write(Structure::Waiting, LineAddress(1), &[[0; LINE_BYTES]]).unwrap();
             let trace = memory.take_trace().unwrap();
             assert!(!settings.path.exists());
             trace.finish().unwrap();

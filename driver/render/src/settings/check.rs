@@ -1,5 +1,6 @@
 //! Checks settings against each other, and against the capacities of cards.
 
+use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_picture::choice::Choice;
 use photoncard_picture::film::Film;
@@ -63,6 +64,14 @@ impl RenderSettings {
         on_card("integrator.planned_samples", self.integrator.planned(), 1, budget.samples)?;
         if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
             on_card("schedule.queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
+        }
+        if self.schedule.order == GatherOrder::Buckets && budget.waiting_blocks == 0 {
+            return Err(RenderError::Setting {
+                field: "schedule.order",
+                value: self.schedule.order.name().into(),
+                reason: "a card's chip has no room for tables of gathers that wait in card memory".into(),
+                remedy: "use sort, or a chip with waiting_blocks".into(),
+            });
         }
         if let Some(in_flight) = self.schedule.in_flight {
             on_card("schedule.in_flight", in_flight, 1, budget.in_flight)?;
@@ -223,8 +232,6 @@ fn on_card(field: &'static str, value: u32, least: u32, most: u32) -> Result<(),
 mod tests {
     use photoncard_firmware::kind::REFERENCE;
 
-    use photoncard_cards::scheduler::GatherOrder;
-
     use super::super::{PhotonMaps, Schedule};
     use super::*;
 
@@ -260,6 +267,14 @@ mod tests {
             reason.starts_with("picture.layers") && remedy.contains("render on another card, or leave"),
             "{reason} {remedy}"
         );
+    }
+
+    #[test]
+    fn gathers_wait_in_card_memory_only_on_chips_with_tables_for_them() {
+        let settings = RenderSettings::default().with(|s| s.schedule.order = GatherOrder::Buckets);
+        settings.check_budget(&REFERENCE).unwrap();
+        let (reason, remedy) = refusal(&settings, &Budget { waiting_blocks: 0, ..REFERENCE });
+        assert!(reason.starts_with("schedule.order") && remedy.contains("sort"), "{reason} {remedy}");
     }
 
     #[test]

@@ -152,7 +152,14 @@ mod tests {
         let counters =
             Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
         let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
-        let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads, contents: Contents::ZERO };
+        let tile = TileMeasurement {
+            tile: 0,
+            stands_for: 1,
+            counters,
+            reads,
+            waiting_written_bytes: 0,
+            contents: Contents::ZERO,
+        };
         let error = TileDeviation { pixels: 256, squares: 7.0, noise: 0.5, sum: 760.0, reference: 768.0 };
         let outcome = |point: &Point| match point.task {
             Task::Traffic { .. } => Outcome::Traffic(Measurement {

@@ -63,8 +63,8 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Lines of a card's memory: room for the image of any frame.
-const DRAM_LINES: usize = 256;
+/// Lines of a card's memory: room for the image of any frame, and for gathers and blocks that wait.
+const DRAM_LINES: usize = 4096;
 
 /// Card memory with a buffer of its own.
 pub(crate) struct Memory {
@@ -84,7 +84,7 @@ impl MemoryPort for Memory {
         self.lines.get(address.0 as usize).ok_or(fault)
     }
 
-    fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
+    fn write(&mut self, _: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         copy_lines(lines, self.lines.get_mut(first.0 as usize..first.0 as usize + lines.len())?);
         Some(())
     }
@@ -105,7 +105,7 @@ pub(crate) const IN_FLIGHT: u32 = 3;
 
 /// A micro chip with several tiles in flight.
 fn chip() -> EmulatedChip {
-    let budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: IN_FLIGHT, ..MICRO };
+    let budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: IN_FLIGHT, waiting_blocks: 4, ..MICRO };
     EmulatedKind::Micro.emulated().with_budget(budget).chip()
 }
 
@@ -123,9 +123,9 @@ impl Fixture {
         Self::of(&scene(), settings())
     }
 
-    /// Frames whose gather queues fill within a tile: of any order with a queue, with irradiance records,
-    /// with layers.
-    pub(crate) fn crowded() -> [Self; 3] {
+    /// Frames whose gather queues fill within a tile: of any order with a queue, or in card memory, with
+    /// irradiance records, with layers.
+    pub(crate) fn crowded() -> [Self; 5] {
         let frame = |order, queue, irradiance_error, layers: &str| {
             let settings = settings().with(|s| {
                 s.integrator.irradiance_error = irradiance_error;
@@ -138,6 +138,8 @@ impl Fixture {
             frame(GatherOrder::Sort, 7, None, "none"),
             frame(GatherOrder::Hash, 1, Some(0.2), "none"),
             frame(GatherOrder::Sort, 20, Some(0.05), "all"),
+            frame(GatherOrder::Buckets, 20, Some(0.05), "none"),
+            frame(GatherOrder::Buckets, 1000, None, "all"),
         ]
     }
 
@@ -206,6 +208,8 @@ impl Fixture {
     pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
         let tiles = tiles(self.settings.window(), self.settings.tile_side(&[]), self.settings.schedule.order);
         let scheduler = Scheduler::new(tiles, cards).with_helpers();
+        let is_in_shares = self.settings.schedule.order == GatherOrder::Buckets;
+        let scheduler = if is_in_shares { scheduler.in_shares() } else { scheduler };
         match verify {
             Some(share) => scheduler.verifying(share, seed),
             None => scheduler,

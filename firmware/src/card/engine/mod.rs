@@ -4,7 +4,7 @@
 mod tests;
 
 use heapless::Deque;
-use photoncard_shared::budget::Budget;
+use photoncard_shared::budget::{Budget, MAX_WAITING_BLOCKS};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
@@ -23,7 +23,7 @@ use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
 
 /// Maximum number of queued tile commands of a card, whatever its kind of chip.
-pub const MAX_TILES: usize = 8;
+pub const MAX_TILES: usize = MAX_WAITING_BLOCKS as usize;
 
 /// Engine of a card: its chip, and the card image, frame and tiles that commands set.
 pub(super) struct Engine<K: ChipKind> {
@@ -207,7 +207,7 @@ impl<K: ChipKind> Engine<K> {
             return Err(Fault { code: FaultCode::Tile, detail: tile.id });
         }
         let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
-        if self.tiles.len() + self.begun >= self.chip.kind().budget().tiles as usize {
+        if self.tiles.len() + self.begun >= frame.tiles_of(self.chip.kind().budget()) as usize {
             return Err(too_many);
         }
         self.is_flushed = false;

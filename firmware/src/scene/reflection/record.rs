@@ -27,6 +27,23 @@ pub struct PartialReflection {
 const _: () = assert!(size_of::<PartialReflection>() == 13);
 
 impl PartialReflection {
+    /// Reflection of a black surface.
+    pub const NONE: Self =
+        Self { diffuse: Rgbe([0; 4]), lobe: Rgbe([0; 4]), shape: Shape([0; 4]), normal: 0 };
+
+    /// Encodes the reflection function.
+    pub fn to_bytes(self) -> [u8; 13] {
+        let ([a, b, c, d], [e, f, g, h], [i, j, k, l]) = (self.diffuse.0, self.lobe.0, self.shape.0);
+        [a, b, c, d, e, f, g, h, i, j, k, l, self.normal]
+    }
+
+    /// Reflection function of the bytes that [`Self::to_bytes`] returned.
+    pub fn from_bytes([a, b, c, d, e, f, g, h, i, j, k, l, normal]: &[u8; 13]) -> Self {
+        let [diffuse, lobe, shape] =
+            [[a, b, c, d], [e, f, g, h], [i, j, k, l]].map(|bytes| bytes.map(|byte| *byte));
+        Self { diffuse: Rgbe(diffuse), lobe: Rgbe(lobe), shape: Shape(shape), normal: *normal }
+    }
+
     /// Encodes `weight` times a reflector's `f` towards its outgoing direction. Colours are rounded to a
     /// shared exponent, at random by the bits of `dither`, so that the rounding is unbiased.
     // One copy for final gathers and caustics: code is memory on a chip.

@@ -1,0 +1,58 @@
+//! Chains: records in lines of card memory, each of which has the address of the next older line. A chain is
+//! written from its oldest line on and read from its newest line on.
+
+use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+use photoncard_shared::message::{Fault, Invariant};
+
+use crate::memory::{MemoryPort, Room};
+
+/// Bytes of a line that hold records. The address of the older line and the number of records follow.
+pub(super) const RECORD_BYTES: usize = 120;
+
+/// Address that stands for no line: a card image has at least this line.
+pub(super) const NONE: u32 = 0;
+
+/// Appends a line with encoded records to the chain whose newest line is `newest`. The line becomes the
+/// newest.
+pub(super) fn append<const N: usize>(
+    memory: &mut impl MemoryPort,
+    room: &mut Room,
+    newest: &mut u32,
+    records: impl Iterator<Item = [u8; N]>,
+) -> Result<(), Fault> {
+    let mut line = Line::ZERO;
+    let mut count = 0;
+    let (bytes, end) = line.0.split_at_mut(RECORD_BYTES);
+    for (place, record) in bytes.as_chunks_mut().0.iter_mut().zip(records) {
+        *place = record;
+        count += 1;
+    }
+    if let Some((older, rest)) = end.split_first_chunk_mut() {
+        *older = newest.to_le_bytes();
+        rest.iter_mut().take(1).for_each(|byte| *byte = count);
+    }
+    *newest = room.write(memory, &line)?;
+    Ok(())
+}
+
+/// Reads the newest line of a chain, whose next older line becomes the newest. `take` is called with each
+/// record of the line. Lines are written upwards, so that a chain ends whatever the memory holds.
+///
+/// # Errors
+/// [`Invariant::Room`] if the older line does not lie before the newest.
+pub(super) fn read<const N: usize>(
+    memory: &mut impl MemoryPort,
+    newest: &mut u32,
+    mut take: impl FnMut(&[u8; N]) -> Result<(), Fault>,
+) -> Result<(), Fault> {
+    let line = memory.read(Structure::Waiting, LineAddress(*newest), 0..LINE_BYTES as u32)?;
+    let (bytes, end) = line.0.split_at(RECORD_BYTES);
+    let (older, rest) = end.split_first_chunk().unwrap_or((&[0; 4], &[]));
+    let count = rest.first().copied().unwrap_or(0).into();
+    let older = u32::from_le_bytes(*older);
+    if older >= *newest {
+        return Err(Invariant::Room.fault());
+    }
+    *newest = older;
+    bytes.as_chunks().0.iter().take(count).try_for_each(&mut take)
+}
