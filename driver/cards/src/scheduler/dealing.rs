@@ -32,6 +32,9 @@ impl Scheduler {
             return None;
         }
         let is_idle = tiles.is_empty();
+        if !is_idle && self.cards[card].singly > 0 {
+            return None;
+        }
         let index = (self.next_compared(card))
             .or_else(|| if self.has_share(card) { self.next_waiting(card, is_idle) } else { None })
             .or_else(|| self.compared_for(card, usize::MAX))

@@ -13,6 +13,9 @@
 //!   other one is accepted. If there is only one card, its dazzling tiles are accepted and counted.
 //! - A tile at which cards have crashed (were reset or lost) twice is set apart until all others are done. It
 //!   then goes to the cards with the fewest crashes at it, and is abandoned after five crashes.
+//! - In a render whose gathers wait in card memory a card works on all its tiles at once. If it is lost with
+//!   several, no tile has a crash: the card receives as many tiles one at a time, so that the next crash is
+//!   attributed to the right tile.
 //! - In a render of several passes, a tile is reserved for the card that rendered it before and holds its
 //!   irradiance records. Idle cards take tiles reserved for other cards, the last ones first, unless those
 //!   cards will soon render them.
@@ -187,6 +190,7 @@ impl Scheduler {
         self.times.count(took);
         let at = &mut self.cards[card];
         at.count_time(took, &tile.counters);
+        at.singly = at.singly.saturating_sub(1);
         let entry = &mut self.entries[index];
         if !entry.is_open() || at.standing == Standing::GivenUp {
             self.counts.repeated += 1;
@@ -250,6 +254,7 @@ impl Scheduler {
     /// tile is set apart or abandoned instead. `has_crashed` is true if the card was working on the tile.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
+        self.cards[card].singly += usize::from(self.deals_shares && !has_crashed);
         let entry = &mut self.entries[index];
         if !entry.is_open() {
             return;

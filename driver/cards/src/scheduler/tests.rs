@@ -290,6 +290,24 @@ fn a_tile_with_two_crashes_waits_until_all_others_are_done() {
 }
 
 #[test]
+fn a_card_that_is_lost_with_several_tiles_in_shares_receives_as_many_one_at_a_time() {
+    let mut scheduler = scheduler(9, 2).in_shares();
+    let taken = |scheduler: &mut Scheduler, card| -> Vec<u32> {
+        std::iter::from_fn(|| take(scheduler, card, SECOND)).collect()
+    };
+    assert_eq!(taken(&mut scheduler, 0), [0, 1, 2, 3, 4]);
+    for id in (0..5).rev() {
+        scheduler.give_back(0, id, false, SECOND);
+    }
+    assert!(scheduler.entries.iter().all(|entry| entry.crashes.is_empty()));
+    for id in 0..5 {
+        assert_eq!(taken(&mut scheduler, 0), [id]);
+        answer(&mut scheduler, 0, id, 0, SECOND);
+    }
+    assert_eq!([taken(&mut scheduler, 1), taken(&mut scheduler, 0)], [[5, 6], [7, 8]]);
+}
+
+#[test]
 fn kept_tiles_are_verified_by_one_card() {
     let window = photoncard_picture::film::Window::full(2, 1);
     let mut film = Film::new(2, 1, window, SumFormat::ONE).unwrap();

@@ -210,10 +210,15 @@ impl Session {
     fn at_work(&self) -> usize {
         let of_card = self.budget.map_or(1, |budget| budget.in_flight);
         match &self.job {
-            Some(job) if job.frame.drain == Drain::Buckets => self.credits(),
+            Some(_) if self.is_in_rounds() => self.credits(),
             Some(job) => of_card.min(job.frame.in_flight) as usize,
             None => of_card as usize,
         }
+    }
+
+    /// Returns whether gathers wait in card memory, so that the card works on all its tiles at once.
+    fn is_in_rounds(&self) -> bool {
+        self.job.as_ref().is_some_and(|job| job.frame.drain == Drain::Buckets)
     }
 
     /// Statistics of the link so far.
@@ -380,9 +385,11 @@ impl Session {
         self.unheard_bytes >= least
     }
 
-    /// Reports the unfinished tiles of a lost or reset card as events.
+    /// Reports the unfinished tiles of a lost or reset card as events. If gathers wait in card memory and the
+    /// card has several tiles, any of them may have caused the loss: none is reported as being at work.
     pub fn give_back(&mut self) {
-        let at_work = self.at_work();
+        let is_any = self.is_in_rounds() && self.tiles.len() > 1;
+        let at_work = if is_any { 0 } else { self.at_work() };
         self.tiles.give_back(at_work, &mut self.events);
     }
 

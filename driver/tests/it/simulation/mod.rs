@@ -218,28 +218,30 @@ fn a_card_that_is_reset_before_the_start_is_greeted_again() {
 #[test]
 fn tiles_at_which_every_card_crashes_are_named_when_all_others_are_done() {
     with_room_for_a_card(|| {
-        let fixture = Fixture::new();
-        let alone = Run::new(&fixture, 1, 0).go();
-        for seed in 0..20 {
-            let cards = 1 + seed as usize % 4;
-            let poison: Vec<u32> = [[3, 4].as_slice(), &[0, 1, 9], &[15]][seed as usize % 3].to_vec();
-            let outcome = Run { poison: poison.clone(), ..Run::new(&fixture, cards, seed) }.go();
-            let End::Fault(SchedulerError::Unrendered { tiles }) = outcome.end else {
-                panic!("seed {seed}: {:?}", outcome.end);
-            };
-            let mut named: Vec<u32> = tiles.iter().map(|tile| tile.id).collect();
-            named.sort_unstable();
-            assert_eq!(named, poison, "seed {seed}");
-            assert_eq!(
-                outcome.tiles.len() + poison.len(),
-                alone.tiles.len(),
-                "seed {seed}: others are missing"
-            );
-            assert!(outcome.tiles.iter().all(|(id, tile)| *tile == alone.tiles[id]), "seed {seed}");
-            assert_eq!(outcome.given_up, 0, "seed {seed}: a card is given up for a tile's fault");
-            assert!(outcome.bytes.resets <= 7 * poison.len() as u64, "seed {seed}: {:?}", outcome.bytes);
+        let [.., in_rounds, _] = Fixture::crowded();
+        for fixture in [Fixture::new(), in_rounds] {
+            are_named_when_all_others_are_done(&fixture);
         }
     });
+}
+
+fn are_named_when_all_others_are_done(fixture: &Fixture) {
+    let alone = Run::new(fixture, 1, 0).go();
+    for seed in 0..20 {
+        let cards = 1 + seed as usize % 4;
+        let poison: Vec<u32> = [[3, 4].as_slice(), &[0, 1, 9], &[15]][seed as usize % 3].to_vec();
+        let outcome = Run { poison: poison.clone(), ..Run::new(fixture, cards, seed) }.go();
+        let End::Fault(SchedulerError::Unrendered { tiles }) = outcome.end else {
+            panic!("seed {seed}: {:?}", outcome.end);
+        };
+        let mut named: Vec<u32> = tiles.iter().map(|tile| tile.id).collect();
+        named.sort_unstable();
+        assert_eq!(named, poison, "seed {seed}");
+        assert_eq!(outcome.tiles.len() + poison.len(), alone.tiles.len(), "seed {seed}: others are missing");
+        assert!(outcome.tiles.iter().all(|(id, tile)| *tile == alone.tiles[id]), "seed {seed}");
+        assert_eq!(outcome.given_up, 0, "seed {seed}: a card is given up for a tile's fault");
+        assert!(outcome.bytes.resets <= 7 * poison.len() as u64, "seed {seed}: {:?}", outcome.bytes);
+    }
 }
 
 /// The card holds a session of another host with the session number that this host draws.
