@@ -156,9 +156,10 @@ impl Renderer {
             samples: film.format().samples,
             ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
         };
+        let image = &prepared.image;
+        cards.leave_out(&|budget| settings.check_waiting_room(&frame, image, budget), needed, observer)?;
         let film = Mutex::new(film);
         let sinks = outputs.sinks(&film);
-        let image = &prepared.image;
         let work = Work { settings, image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };
         let budgets = cards.budgets();
         let mut outcome = cards.run(work).inspect_err(|_| outputs.report_kept())?;

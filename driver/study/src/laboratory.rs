@@ -203,6 +203,8 @@ impl<'a> Laboratory<'a> {
         let is_stopped = || self.observer.is_stopped();
         let bench =
             Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
+        let frame = bench.frame(&point.settings)?;
+        point.settings.check_waiting_room(&frame, &last.mapped.image, &point.chip().budget())?;
         let outcome = match &point.task {
             Task::Traffic { caches, .. } if point.is_along_curve => {
                 Outcome::Traffic(bench.along_curve(&point.settings, caches)?)

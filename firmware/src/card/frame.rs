@@ -4,11 +4,21 @@ use photoncard_shared::budget::{Budget, MAX_BINS};
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Parameter, Radiance};
 
-/// Checks a frame's parameters against the budget and the card image.
+use crate::chip::least_waiting_lines;
+
+/// Checks a frame's parameters against the budget, the card image and the number `lines` of lines of card
+/// memory.
 ///
 /// # Errors
 /// The fault of the first parameter out of range.
-pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParameters) -> Result<(), Fault> {
+pub(super) fn check_frame(
+    budget: &Budget,
+    header: &Header,
+    lines: u32,
+    frame: &FrameParameters,
+) -> Result<(), Fault> {
+    let free = u64::from(lines.saturating_sub(header.lines));
+    let can_wait = budget.waiting_blocks > 0 && least_waiting_lines(frame, budget) <= free;
     let camera = &frame.camera;
     let camera = [camera.origin, camera.forward, camera.right, camera.up];
     let within = |value: u32, most: u32| (1..=most).contains(&value);
@@ -29,7 +39,7 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::MaxDistance, is_positive(frame.max_distance)),
         (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
         (Parameter::Bins, within(frame.bins, MAX_BINS)),
-        (Parameter::Drain, frame.drain != Drain::Buckets || budget.waiting_blocks > 0),
+        (Parameter::Drain, frame.drain != Drain::Buckets || can_wait),
         (Parameter::Queue, frame.queue >= 1),
         (Parameter::InFlight, frame.in_flight >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),

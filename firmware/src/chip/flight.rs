@@ -108,9 +108,9 @@ impl<K: ChipKind> Flight<K> {
         self.position = Position::at(Pass::NextBlock);
     }
 
-    /// Number of pixels of the next block; 0 if all have begun.
-    pub(super) fn pixels_of_next_block(&self) -> u32 {
-        self.blocks.last().map_or(0, Block::pixels)
+    /// Window of the next block; an empty one if all have begun.
+    pub(super) fn window_of_next_block(&self) -> Window {
+        self.blocks.last().unwrap_or(&Block::EMPTY).window(&self.tile)
     }
 
     /// Removes the blocks that have not begun.
@@ -206,8 +206,7 @@ impl<K: ChipKind> Flight<K> {
     }
 
     pub(super) fn window(&self) -> Window {
-        let [x0, y0] = [self.tile.x + self.block.x, self.tile.y + self.block.y];
-        Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
+        self.block.window(&self.tile)
     }
 
     /// Identifies path `path` of sample `sample` of the block's pixel `index`.

@@ -49,6 +49,7 @@ use self::flight::Flight;
 pub use self::light::{Component, PixelLight};
 use self::position::{Pass, Position};
 use self::rounds::Rounds;
+pub use self::rounds::least_waiting_lines;
 use crate::gather::{Buckets, GatherQueue, PointIndex};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;

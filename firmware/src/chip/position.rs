@@ -1,6 +1,8 @@
 //! Progress of a tile: its blocks, and the passes of a block.
 
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::message::{FrameParameters, Tile};
+
+use crate::irradiance_cache::Window;
 
 /// A rectangle of a tile's pixels. Coordinates are relative to the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +23,12 @@ impl Block {
 
     pub(super) fn pixels(&self) -> u32 {
         self.width * self.height
+    }
+
+    /// Pixels of the block in the picture.
+    pub(super) fn window(&self, tile: &Tile) -> Window {
+        let [x0, y0] = [tile.x + self.x, tile.y + self.y];
+        Window { x0, x1: x0 + self.width, y0, y1: y0 + self.height }
     }
 
     /// Column and row, in the tile, of the block's pixel with row-major index `index`.

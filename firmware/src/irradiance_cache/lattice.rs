@@ -138,6 +138,23 @@ pub struct Window {
     pub y1: u32,
 }
 
+impl Window {
+    /// Number of pixels.
+    pub(crate) fn pixels(&self) -> u64 {
+        u64::from(self.x1.saturating_sub(self.x0)) * u64::from(self.y1.saturating_sub(self.y0))
+    }
+
+    /// Upper bound of the number of lattice points of the window: all corners of the finest cells in the
+    /// coarsest cells that overlap the window.
+    pub(crate) fn most_points(&self) -> u64 {
+        let of_axis = |first: u32, end: u32| {
+            let cells = u64::from(end).div_ceil(COARSEST_SIDE.into()) - u64::from(first / COARSEST_SIDE);
+            cells * u64::from(COARSEST_SIDE / side(LEVELS - 1)) + 1
+        };
+        of_axis(self.x0, self.x1.max(self.x0)) * of_axis(self.y0, self.y1.max(self.y0))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,5 +200,25 @@ mod tests {
         for corner in children.flat_map(|child| child.corners()) {
             assert!(cell.middles().contains(&corner) || cell.corners().contains(&corner));
         }
+    }
+
+    #[test]
+    fn a_window_has_no_more_points_than_its_bound() {
+        for (x0, width, y0, height) in
+            [(0, 16, 0, 16), (5, 1, 31, 2), (16, 17, 32, 3), (15, 2, 7, 33), (0, 64, 0, 1)]
+        {
+            let window = Window { x0, x1: x0 + width, y0, y1: y0 + height };
+            let mut points = std::collections::BTreeSet::new();
+            for (x, y) in (x0..window.x1).flat_map(|x| (y0..window.y1).map(move |y| (x, y))) {
+                let root = Cell::coarsest(x, y).corner;
+                for number in 0..Cell::of_level(LEVELS - 1) {
+                    let corners = Cell::in_tree(root, LEVELS - 1, number).corners();
+                    points.extend(corners.map(|LatticePoint { x, y }| (x, y)));
+                }
+            }
+            assert_eq!(points.len() as u64, window.most_points(), "{window:?}");
+            assert_eq!(window.pixels(), u64::from(width * height));
+        }
+        assert_eq!(Window { x0: 3, x1: 3, y0: 4, y1: 4 }.pixels(), 0);
     }
 }

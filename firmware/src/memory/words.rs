@@ -47,6 +47,11 @@ impl Room {
         self.next
     }
 
+    /// Address past the last line.
+    pub const fn end(&self) -> u32 {
+        self.end
+    }
+
     /// Writes the next line and returns its address.
     ///
     /// # Errors

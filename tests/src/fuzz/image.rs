@@ -19,10 +19,11 @@ use crate::everything::everything;
 use crate::wire::{Answer, Wire};
 use crate::{camera, lambertian, room, scene};
 
-/// Number of lines of the card's memory.
-const DRAM_LINES: usize = 1024;
-/// Tile in the middle of the picture, in which several walls are seen.
-const TILE: Tile = Tile { id: 7, x: 2, y: 2, width: 4, height: 4 };
+/// Number of lines of the card's memory: gathers that wait there have room after most images.
+pub const DRAM_LINES: usize = 4096;
+/// Tiles in the middle of the picture, in which several walls are seen.
+const TILES: [Tile; 2] =
+    [Tile { id: 7, x: 2, y: 2, width: 4, height: 2 }, Tile { id: 8, x: 2, y: 4, width: 4, height: 2 }];
 
 /// Target for card images. An input is a byte that selects techniques, and an image.
 pub(super) struct Image {
@@ -31,7 +32,10 @@ pub(super) struct Image {
 
 /// Card images of a lit room with a few photons and irradiance points, in both layouts of the photon map, and
 /// of the scene with every feature, with a caustic map.
-fn images() -> [CardImage; 3] {
+///
+/// # Panics
+/// If a scene cannot be packed.
+pub fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
     let glossy = Material::phong("glossy", Vec3::splat(0.5), Vec3::splat(0.25), 12.0);
@@ -55,7 +59,7 @@ fn images() -> [CardImage; 3] {
 }
 
 /// Frame with the techniques that the bits of `choice` select.
-fn frame(choice: u8) -> FrameParameters {
+pub fn frame(choice: u8) -> FrameParameters {
     let settings = RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
         ..RenderSettings::default()
@@ -142,33 +146,46 @@ impl Target for Image {
     fn read(&self, input: &[u8]) -> bool {
         let Some((&choice, image)) = input.split_first() else { return false };
         let lines: Vec<Line> = image.as_chunks().0.iter().map(|&line| Line(line)).collect();
-        let mut memory = vec![Line::ZERO; DRAM_LINES];
-        let mut wire = Wire::new(&mut memory);
-        wire.hello();
-        // If the memory is too small for the image, each command of the load is answered by a fault.
-        match wire.load(&lines).last() {
-            Some(Answer::ImageAccepted) => {}
-            Some(Answer::Fault(_)) => return false,
-            other => panic!("loading ends in {other:?}"),
-        }
-        match wire.say(&Command::BeginFrame(frame(choice)))[..] {
-            [Answer::FrameAccepted] => {}
-            // An edit may have removed the irradiance points from the header.
-            [Answer::Fault(FaultCode::Parameter)] if frame(choice).radiance == Radiance::Precomputed => {
-                return false;
-            }
-            ref other => panic!("the frame begins with {other:?}"),
-        }
-        let answers = wire.say(&Command::RenderTile(TILE));
-        match answers.last() {
-            Some(&Answer::TileDone(id)) => {
-                assert_eq!((id, pixels(&answers) as u64), (TILE.id, TILE.pixels()));
-                true
-            }
-            Some(Answer::Fault(_)) => false,
-            other => panic!("rendering ends in {other:?}"),
-        }
+        is_rendered(choice, &lines, &mut vec![Line::ZERO; DRAM_LINES])
     }
+}
+
+/// Loads a card image and renders two tiles of the frame of `choice`. Returns whether the card does it without
+/// a fault.
+///
+/// # Panics
+/// If the card answers with neither pixels nor a fault.
+pub fn is_rendered(choice: u8, lines: &[Line], memory: &mut [Line]) -> bool {
+    let mut wire = Wire::new(memory);
+    wire.hello();
+    // If the memory is too small for the image, each command of the load is answered by a fault.
+    match wire.load(lines).last() {
+        Some(Answer::ImageAccepted) => {}
+        Some(Answer::Fault(_)) => return false,
+        other => panic!("loading ends in {other:?}"),
+    }
+    let frame = frame(choice);
+    match wire.say(&Command::BeginFrame(frame))[..] {
+        [Answer::FrameAccepted] => {}
+        // An edit may have removed the irradiance points from the header, or left no room for gathers.
+        [Answer::Fault(FaultCode::Parameter)]
+            if frame.radiance == Radiance::Precomputed
+                || frame.drain == Drain::Buckets && lines.len() > DRAM_LINES / 2 =>
+        {
+            return false;
+        }
+        ref other => panic!("the frame begins with {other:?}"),
+    }
+    let [first, second] = TILES.map(Command::RenderTile);
+    let answers = wire.say_all(&[first, second, Command::Flush]);
+    if answers.iter().any(|answer| matches!(answer, Answer::Fault(_))) {
+        return false;
+    }
+    for tile in TILES {
+        assert!(answers.contains(&Answer::TileDone(tile.id)), "{answers:?}");
+    }
+    assert_eq!(pixels(&answers) as u64, TILES.iter().map(Tile::pixels).sum::<u64>());
+    true
 }
 
 /// Number of pixels in all answers.

@@ -8,7 +8,7 @@ mod compressed;
 pub(crate) mod environment;
 pub(crate) mod gltf;
 mod headed;
-mod image;
+pub mod image;
 mod messages;
 pub(crate) mod mutation;
 pub(crate) mod picture;

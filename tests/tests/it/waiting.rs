@@ -8,9 +8,9 @@ use photoncard_driver::emulator::direct::{RenderedTile, render_tiles};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::{MappedImage, map_photons};
-use photoncard_driver::render::RenderSettings;
+use photoncard_driver::render::{CardAddress, RenderError, RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
-use photoncard_firmware::chip::{Chip, Progress};
+use photoncard_firmware::chip::{Chip, Progress, least_waiting_lines};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind::ChipKind;
 use photoncard_firmware::memory::{Counted, Dram};
@@ -20,8 +20,10 @@ use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 use photoncard_shared::budget::{Budget, sums_of_pixel};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Drain, FrameParameters, Tile};
+use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Tile};
 use photoncard_tests::everything::everything;
+use photoncard_tests::fuzz::image::{DRAM_LINES, frame as fuzzed_frame, images, is_rendered};
+use photoncard_tests::wire::{Answer, Wire};
 use proptest::prelude::*;
 
 /// Card image, and a picture's frame.
@@ -100,6 +102,29 @@ impl World {
     }
 }
 
+impl World {
+    /// Returns whether a card whose memory has `room` lines after the image accepts a frame.
+    fn is_accepted_by_card(&self, frame: &FrameParameters, room: usize) -> bool {
+        let mut memory = vec![Line::ZERO; self.image.len() + room];
+        let mut wire = Wire::new(&mut memory);
+        wire.hello();
+        assert_eq!(wire.load(&self.image).last(), Some(&Answer::ImageAccepted));
+        match wire.say(&Command::BeginFrame(*frame))[..] {
+            [Answer::FrameAccepted] => true,
+            [Answer::Fault(FaultCode::Parameter)] => false,
+            ref other => panic!("{other:?}"),
+        }
+    }
+
+    /// Renders the picture on an emulated card whose memory has `room` lines after the image.
+    fn render_on_card(&self, room: usize) -> Result<Rendering, RenderError> {
+        let bytes = ((self.image.len() + room) * LINE_BYTES) as u64;
+        let card = CardAddress::emulated(EmulatedKind::Micro).with_memory(bytes);
+        let settings = self.settings.clone().with(|s| s.cards.addresses = vec![card]);
+        render(&everything(), &settings, &Unobserved)
+    }
+}
+
 /// Sums of all pixels, row by row, from those of tiles.
 fn tiles_of_film(tiles: &[Tile], parts: &[(u32, RenderedTile)], frame: &FrameParameters) -> Vec<[i64; 3]> {
     let count = sums_of_pixel(frame.layers) as usize;
@@ -170,6 +195,57 @@ fn a_gather_takes_a_fifth_of_a_line_twice_and_its_result_an_eighth() {
     let least = (lines + results) * LINE_BYTES as u64;
     let most = least + (2048 + 300) * LINE_BYTES as u64;
     assert!((least..most).contains(&read), "{read}, {least} to {most}");
+}
+
+/// From the least memory on which a card accepts the frame, more and more blocks wait together: the picture
+/// stays, and buckets are read in fewer rounds.
+#[test]
+fn as_many_blocks_wait_as_have_room() {
+    for (irradiance_error, rays) in [(None, 64), (Some(0.1), 64)] {
+        let world = World::new(|s| {
+            (s.integrator.irradiance_error, s.integrator.gather_rays) = (irradiance_error, rays);
+        });
+        let frame = FrameParameters { drain: Drain::Buckets, ..world.frame };
+        let micro = EmulatedKind::Micro.emulated();
+        let expected = world.render(&mut micro.chip(), &world.frame, (4, 0));
+        let least = least_waiting_lines(&frame, micro.budget()) as usize;
+        let pictures = [1, 2, 4, 32].map(|times| world.render(&mut micro.chip(), &frame, (4, times * least)));
+        for picture in &pictures {
+            assert!(picture.pixels == expected.pixels);
+            assert!(picture.waiting.read > 0, "no gather has waited");
+        }
+        let drains = pictures.map(|picture| picture.work.drains);
+        assert!(drains.is_sorted_by(|few, many| few >= many) && drains[0] > drains[3], "{drains:?}");
+    }
+}
+
+/// The card refuses the frame, and the host says what helps.
+#[test]
+fn a_frame_whose_gathers_have_no_room_is_refused() {
+    for (irradiance_error, keep_records) in [(None, false), (Some(0.1), false), (Some(0.1), true)] {
+        let world = World::new(|s| {
+            s.integrator.irradiance_error = irradiance_error;
+            (s.schedule.order, s.schedule.keep_records) = (GatherOrder::Buckets, keep_records);
+        });
+        let needed = least_waiting_lines(&world.frame, EmulatedKind::Micro.emulated().budget()) as usize;
+        for (room, is_enough) in [(needed - 1, false), (needed, true)] {
+            assert_eq!(world.is_accepted_by_card(&world.frame, room), is_enough);
+            let in_queue = FrameParameters { drain: Drain::Sort, ..world.frame };
+            let without_gathers = FrameParameters { gather_rays: 0, ..world.frame };
+            assert!(world.is_accepted_by_card(&in_queue, room));
+            assert!(world.is_accepted_by_card(&without_gathers, room));
+            match world.render_on_card(room) {
+                Ok(_) => assert!(is_enough),
+                Err(RenderError::Setting { field, reason, remedy, .. }) => {
+                    assert!(!is_enough && field == "schedule.order", "{field}: {reason}");
+                    let bytes = [needed, room].map(|lines| (lines * LINE_BYTES).to_string());
+                    assert!(bytes.iter().all(|bytes| reason.contains(bytes)), "{reason}");
+                    assert!(remedy.contains("sort") && remedy.contains("with_memory"), "{remedy}");
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
 }
 
 #[test]
@@ -244,4 +320,22 @@ fn damage_of_what_waits_ends_in_a_picture_or_a_fault() {
         faults += u32::from(end.is_some());
     }
     assert!(faults > 0, "no damage was found");
+}
+
+/// Frames of fuzzed images, of which a card has memory for all gathers.
+#[test]
+fn gathers_of_fuzzed_frames_wait() {
+    let mut frames = 0;
+    for image in &images() {
+        for choice in (0..=u8::MAX).filter(|&choice| fuzzed_frame(choice).drain == Drain::Buckets) {
+            let mut memory = vec![Line::ZERO; DRAM_LINES];
+            let is_done = is_rendered(choice, image.lines(), &mut memory);
+            let lacks_points = fuzzed_frame(choice).radiance == Radiance::Precomputed;
+            assert!(is_done || lacks_points, "{choice:#b}");
+            let mut beyond = memory[image.lines().len()..].iter();
+            assert!(!is_done || beyond.any(|line| *line != Line::ZERO), "{choice:#b}: no gather has waited");
+            frames += u32::from(is_done);
+        }
+    }
+    assert!(frames > 100, "{frames}");
 }

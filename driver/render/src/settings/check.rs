@@ -2,9 +2,13 @@
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
+use photoncard_firmware::chip::least_waiting_lines;
+use photoncard_map::pack::CardImage;
 use photoncard_picture::choice::Choice;
 use photoncard_picture::film::Film;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MAX_BINS};
+use photoncard_shared::message::FrameParameters;
 
 use super::{MIN_IRRADIANCE_ERROR, Picture, RenderSettings};
 use crate::address::{CardAddress, check_chips, first_remote, is_one_emulated_chip};
@@ -78,6 +82,34 @@ impl RenderSettings {
         }
         on_card("schedule.tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
         self.check_tile_with_layers(budget)
+    }
+
+    /// Checks that a card's memory has room for gathers that wait there, after the card image, if the order
+    /// asks for it.
+    ///
+    /// # Errors
+    /// If a round of one block has no room.
+    pub fn check_waiting_room(
+        &self,
+        frame: &FrameParameters,
+        image: &CardImage,
+        budget: &Budget,
+    ) -> Result<(), RenderError> {
+        let needed = least_waiting_lines(frame, budget).saturating_mul(LINE_BYTES as u64);
+        let free = budget.dram_bytes.saturating_sub(image.bytes());
+        if needed <= free {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            field: "schedule.order",
+            value: self.schedule.order.name().into(),
+            reason: format!(
+                "gathers wait in {needed} bytes or more of a card's memory, and the card image leaves {free}"
+            ),
+            remedy: "use sort, lower `photons.count`, or use a card with more memory (an emulated one by \
+                     `CardAddress::with_memory`)"
+                .into(),
+        })
     }
 
     /// Checks that the error bound of interpolated irradiance is valid, if there is one.

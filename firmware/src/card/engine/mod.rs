@@ -117,7 +117,7 @@ impl<K: ChipKind> Engine<K> {
             }
             Command::BeginFrame(frame) => {
                 let scene = self.image.scene().filter(|_| self.checksums.is_none()).ok_or(OUT_OF_ORDER)?;
-                check_frame(self.chip.kind().budget(), &scene.header, &frame)?;
+                check_frame(self.chip.kind().budget(), &scene.header, memory.lines(), &frame)?;
                 let room = scene.header.lines..memory.lines();
                 self.drop_tiles();
                 self.chip.begin_frame(&frame, room);

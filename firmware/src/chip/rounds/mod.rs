@@ -8,7 +8,10 @@
 //! that have pixels with gather rays fill the other round. If it becomes full, its gathers are done first:
 //! its blocks wait for pixels alone, and need no further round.
 //!
-//! Gathers for which there is no room are done at once.
+//! A block begins in a round only if all of its gathers, their results and its state have room there: with
+//! little memory fewer blocks wait together. Only the first block of a round always begins; those of its
+//! gathers that have no room are done at once. [`least_waiting_lines`] is the memory below which a card
+//! refuses the frame.
 //!
 //! [`Buckets`]: crate::gather::Buckets
 //! [`Drain::Buckets`]: photoncard_shared::message::Drain::Buckets
@@ -27,6 +30,7 @@ use self::saved_block::most_words;
 use super::flight::{MAX_BLOCKS, allowed_error};
 use super::position::Block;
 use crate::gather::{MAX_BUCKET_LINE, RESULTS_PER_LINE, Results, WrittenResults};
+use crate::irradiance_cache::Window;
 use crate::kind::{Array, Capacity, Vacant};
 use crate::memory::{Room, WORDS};
 
@@ -47,10 +51,20 @@ pub(super) struct Rounds<W: Capacity> {
     present: Option<usize>,
     /// Lines of both rounds.
     lines: Range<u32>,
-    /// Number of lines of a round that are kept free for blocks and for incomplete lines.
-    reserved: u32,
+    reserve: Reserve,
+    /// Number of lines of a round in which as many blocks as the chip can hold have room.
+    ample: u32,
     /// True if both rounds may take gathers at once.
     are_two: bool,
+}
+
+/// Lines of a round that its gathers and results leave free.
+#[derive(Clone, Copy)]
+struct Reserve {
+    /// Incomplete lines of the buckets.
+    buckets: u32,
+    /// State of a block, and its incomplete line of results.
+    block: u32,
 }
 
 /// Work on the gathers of the filled round.
@@ -69,9 +83,9 @@ struct Round<W: Capacity> {
     /// Address of the first line.
     first: u32,
     room: Room,
-    /// Maximum number of gathers, such that their results and all blocks have room too.
-    most_gathers: u32,
     gathers: u32,
+    /// Number of lines with the states of blocks.
+    saved: u32,
     /// Number of blocks that have begun.
     blocks: usize,
     /// Number of blocks that were taken up again.
@@ -123,29 +137,32 @@ impl<W: Capacity> Round<W> {
     const EMPTY: Self = Self {
         first: 0,
         room: Room::NONE,
-        most_gathers: 0,
         gathers: 0,
+        saved: 0,
         blocks: 0,
         resumed: 0,
         is_gathered: false,
         waiting: Array::VACANT,
     };
 
-    /// Begins a round in these lines, of which `reserved` are no gathers' and no results'.
-    fn begin(&mut self, lines: Range<u32>, reserved: u32) {
+    /// Begins a round in these lines.
+    fn begin(&mut self, lines: Range<u32>) {
         self.empty();
-        let count = lines.end.saturating_sub(lines.start);
-        let rest = u64::from(count.saturating_sub(reserved));
-        let (gathers, results) = (GATHERS_PER_LINE as u64, RESULTS_PER_LINE as u64);
-        self.most_gathers = (rest * gathers * results / (gathers + results)).min(u32::MAX.into()) as u32;
         self.first = lines.start;
-        self.room = Room::new(lines.start, count);
+        self.room = Room::new(lines.start, lines.end.saturating_sub(lines.start));
+    }
+
+    /// Returns whether another `gathers` gathers and the states of `blocks` blocks, the present one among
+    /// them, have room. The states of other blocks are written.
+    fn fits(&self, gathers: u64, blocks: usize, reserve: &Reserve) -> bool {
+        let lines = lines_of(u64::from(self.gathers) + gathers, blocks, reserve);
+        lines + u64::from(self.saved) <= u64::from(self.room.end().saturating_sub(self.first))
     }
 
     /// Forgets all blocks.
     fn empty(&mut self) {
         self.room = Room::NONE;
-        (self.most_gathers, self.gathers, self.blocks, self.resumed) = (0, 0, 0, 0);
+        (self.gathers, self.saved, self.blocks, self.resumed) = (0, 0, 0, 0);
         self.is_gathered = false;
     }
 
@@ -167,7 +184,8 @@ impl<W: Capacity> Rounds<W> {
             unread: WrittenResults::NONE,
             present: None,
             lines: 0..0,
-            reserved: 0,
+            reserve: Reserve { buckets: 0, block: 0 },
+            ample: 0,
             are_two: false,
         }
     }
@@ -207,28 +225,35 @@ impl<W: Capacity> Rounds<W> {
         // Kept irradiance records, if any, have half of the lines.
         let lines = (if frame.keep_records { count / 2 } else { count })
             .min(MAX_BUCKET_LINE.saturating_sub(room.start));
-        let blocks = budget.waiting_blocks as usize;
-        // Each chain of a bucket or of results has one incomplete line.
-        let chains = gather_buckets(budget.gather_queue) + blocks;
-        self.reserved = (chains + blocks * most_words(budget).div_ceil(WORDS)) as u32;
+        self.reserve = Reserve::new(frame, budget);
+        let blocks = budget.waiting_blocks.saturating_mul(self.reserve.block);
+        self.ample =
+            lines_of_queue(budget, &self.reserve).saturating_add(blocks.into()).min(u32::MAX.into()) as u32;
         self.lines = room.start..room.start + lines;
         self.are_two = allowed_error(frame).is_some();
         self.lines.end..room.end
     }
 
-    /// Lines for the filled round: the whole of them if they are not shared, else at most half, before or
-    /// after those that the other round uses.
+    /// Lines for the filled round: the whole of them if they are not shared, else at most half. If they are
+    /// ample, they lie before or after those that the other round uses.
     fn lines_of_round(&self) -> Range<u32> {
         let Range { start, end } = self.lines;
-        let half = (end - start) / if self.are_two { 2 } else { 1 };
+        if !self.are_two {
+            return start..end;
+        }
+        let half = (end - start) / 2;
+        // A round has a quarter of the lines at least: the other one has no more than half of them.
+        if half / 2 < self.ample {
+            return if self.filled == 0 { start..start + half } else { start + half..end };
+        }
         let other = self.rounds.get(1 - self.filled.min(1)).filter(|round| round.blocks > 0);
         let used = other.map_or(start..start, Round::used);
         let [below, above] = [used.start - start, end.saturating_sub(used.end)];
         // The lower lines are used again if they are ample, so that an emulated card takes little host
         // memory.
-        let ample = (used.end - used.start).saturating_add(self.reserved.saturating_mul(2));
+        let ample = (used.end - used.start).saturating_add(self.ample.saturating_mul(2));
         if below >= ample || below > above {
-            return start..used.start;
+            return start..used.start.min(start + half);
         }
         used.end..end.min(used.end.saturating_add(half))
     }
@@ -240,7 +265,8 @@ impl<W: Capacity> Rounds<W> {
     /// Lines for the next gather of the block in flight; `None` if there is no room for it.
     pub(super) fn room_for_gather(&mut self) -> Option<&mut Room> {
         self.present?;
-        let round = self.filled_round().filter(|round| round.gathers < round.most_gathers)?;
+        let reserve = self.reserve;
+        let round = self.filled_round().filter(|round| round.fits(1, round.blocks, &reserve))?;
         round.gathers += 1;
         Some(&mut round.room)
     }
@@ -249,19 +275,18 @@ impl<W: Capacity> Rounds<W> {
     /// block of a round always has room: it may do gathers at once.
     fn has_room(&self, gathers: u64) -> bool {
         self.rounds.get(self.filled).is_some_and(|round| {
-            let is_first = round.blocks == 0;
-            let fits = u64::from(round.gathers) + gathers <= u64::from(round.most_gathers);
-            round.blocks < round.waiting.values().len() && (is_first || fits)
+            let fits = || round.fits(gathers, round.blocks + 1, &self.reserve);
+            round.blocks < round.waiting.values().len() && (round.blocks == 0 || fits())
         })
     }
 
     /// Number in the filled round of the block in flight, which is a new one if it has none.
     fn take_number(&mut self) -> Option<usize> {
         if self.present.is_none() {
-            let (lines, reserved) = (self.lines_of_round(), self.reserved);
+            let lines = self.lines_of_round();
             let round = self.filled_round()?;
             if round.blocks == 0 {
-                round.begin(lines, reserved);
+                round.begin(lines);
             }
             round.blocks += 1;
             self.present = Some(round.blocks - 1);
@@ -344,13 +369,107 @@ impl<W: Capacity> Rounds<W> {
     }
 }
 
-/// Upper bound of the number of gathers of a block with `pixels` pixels: of its irradiance records if
-/// `of_records`, else of its pixels without adaptive sampling.
-fn most_gathers(frame: &FrameParameters, budget: &Budget, of_records: bool, pixels: u32) -> u64 {
-    let rays = u64::from(frame.gather_rays);
-    if of_records {
-        return rays * u64::from(budget.irradiance_records);
+impl Reserve {
+    fn new(frame: &FrameParameters, budget: &Budget) -> Self {
+        let block = most_words(budget, allowed_error(frame).is_some()).div_ceil(WORDS) + 1;
+        Self { buckets: gather_buckets(budget.gather_queue) as u32, block: block as u32 }
     }
+}
+
+/// Upper bound of the number of lines of a round with `gathers` gathers, without the states of blocks other
+/// than the present one. `blocks` is the number of blocks, the present one among them.
+fn lines_of(gathers: u64, blocks: usize, reserve: &Reserve) -> u64 {
+    let lines = gathers.div_ceil(GATHERS_PER_LINE as u64) + gathers.div_ceil(RESULTS_PER_LINE as u64);
+    // Each chain of a bucket or of results has one incomplete line.
+    lines + u64::from(reserve.buckets) + blocks as u64 + u64::from(reserve.block)
+}
+
+/// Number of lines of a round of one block with as many gathers as the chip's queue holds.
+fn lines_of_queue(budget: &Budget, reserve: &Reserve) -> u64 {
+    lines_of(budget.gather_queue.into(), 1, reserve)
+}
+
+/// Number of lines of card memory after the card image that a chip with `budget` needs to render a frame with
+/// gathers that wait there: rounds of one block with as many gathers as the chip's own queue holds. It is 0
+/// in other frames.
+pub fn least_waiting_lines(frame: &FrameParameters, budget: &Budget) -> u64 {
+    if frame.drain != Drain::Buckets || frame.gather_rays == 0 {
+        return 0;
+    }
+    let rounds = if allowed_error(frame).is_some() { 2 } else { 1 };
+    let parts = if frame.keep_records { 2 } else { 1 };
+    parts * rounds * lines_of_queue(budget, &Reserve::new(frame, budget))
+}
+
+/// Upper bound of the number of gathers that a block casts first: those of its irradiance records, or of its
+/// pixels in a frame without records.
+fn first_gathers(frame: &FrameParameters, budget: &Budget, window: &Window) -> u64 {
+    if allowed_error(frame).is_none() {
+        return gathers_of_pixels(frame, window.pixels());
+    }
+    u64::from(frame.gather_rays) * window.most_points().min(budget.irradiance_records.into())
+}
+
+/// Upper bound of the number of gathers of `pixels` pixels without adaptive sampling.
+fn gathers_of_pixels(frame: &FrameParameters, pixels: u64) -> u64 {
     let planned = if allowed_error(frame).is_some() { frame.planned_samples.max(1) } else { 1 };
-    u64::from(pixels) * u64::from(frame.samples) * rays.div_ceil(planned.into())
+    pixels * u64::from(frame.samples) * u64::from(frame.gather_rays).div_ceil(planned.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+
+    use photoncard_shared::address::Line;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::gather::{Buckets, GatherRequest, GatherResult, GatherTarget, HilbertCode, PointIndex};
+    use crate::kind::Entries;
+    use crate::memory::Dram;
+
+    const BUCKETS: usize = 4;
+    const BLOCKS: usize = 3;
+
+    /// Number of lines that these gathers, each given by bucket and block, and their results take.
+    fn lines_in_use(gathers: &[(usize, usize)]) -> u32 {
+        let mut lines = vec![Line::ZERO; 2 + 2 * gathers.len()];
+        let (mut memory, mut room) = (Dram::new(&mut lines), Room::new(1, 1 + 2 * gathers.len() as u32));
+        let mut buckets = Buckets::<Entries<BUCKETS>>::new();
+        buckets.clear();
+        let mut held = [GatherRequest::NONE; BUCKETS * GATHERS_PER_LINE];
+        let mut results = [Results::VACANT; BLOCKS];
+        for &(bucket, block) in gathers {
+            let position = HilbertCode::of_bits((bucket as u64) << 62);
+            let target = GatherTarget::of_block(block, PointIndex::Pixel(0));
+            let request = GatherRequest { position, target, ..GatherRequest::NONE };
+            buckets.add(&mut memory, &mut room, &mut held, request).unwrap();
+            let result = GatherResult { target, ..GatherResult::NONE };
+            results[block].add(&mut memory, &mut room, result).unwrap();
+        }
+        (0..BUCKETS).for_each(|bucket| buckets.write(&mut memory, &mut room, &mut held, bucket).unwrap());
+        results.iter_mut().for_each(|results| results.write(&mut memory, &mut room).unwrap());
+        let mut found = 0;
+        for bucket in 0..BUCKETS {
+            while buckets
+                .read(&mut memory, bucket, |_| {
+                    found += 1;
+                    Ok(())
+                })
+                .unwrap()
+            {}
+        }
+        assert_eq!(found, gathers.len());
+        room.next() - 1
+    }
+
+    proptest! {
+        #[test]
+        fn gathers_and_results_take_no_more_lines_than_are_reserved(
+            gathers in prop::collection::vec((0..BUCKETS, 0..BLOCKS), 0..200),
+        ) {
+            let reserve = Reserve { buckets: BUCKETS as u32, block: 0 };
+            prop_assert!(u64::from(lines_in_use(&gathers)) <= lines_of(gathers.len() as u64, BLOCKS, &reserve));
+        }
+    }
 }

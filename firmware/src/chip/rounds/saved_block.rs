@@ -16,11 +16,12 @@ const HEAD_WORDS: usize = 8;
 /// Words of a pixel's sum, without layers.
 const SUM_WORDS: usize = 6;
 
-/// Maximum number of words of a saved block.
-pub(super) const fn most_words(budget: &Budget) -> usize {
+/// Maximum number of words of a saved block. `has_records` is true in a frame with irradiance records.
+pub(super) const fn most_words(budget: &Budget, has_records: bool) -> usize {
     // A pixel has two bytes for the number of its sum, and one for its number of paths.
     let pixels = budget.tile_pixels as usize;
-    HEAD_WORDS + most_cache_words(budget.irradiance_records as usize) + pixels * (1 + SUM_WORDS)
+    let records = if has_records { budget.irradiance_records as usize } else { 0 };
+    HEAD_WORDS + most_cache_words(records) + pixels * (1 + SUM_WORDS)
 }
 
 impl<K: ChipKind> Flight<K> {

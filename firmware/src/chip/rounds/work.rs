@@ -6,9 +6,9 @@ use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant};
 
 use super::super::flight::{Flight, allowed_error};
 use super::super::light::Component;
-use super::super::position::{Block, Pass};
+use super::super::position::Pass;
 use super::super::{Chip, GATHERS_PER_PIECE, Progress};
-use super::{OpenTile, Phase, Unfinished, WaitingBlock, most_gathers};
+use super::{OpenTile, Phase, Unfinished, WaitingBlock, first_gathers, gathers_of_pixels};
 use crate::gather::{GatherResult, PointIndex, WrittenResults};
 use crate::kind::{Array, ChipKind, Vacant};
 use crate::memory::{MemoryPort, WordReader, WordWriter};
@@ -56,32 +56,45 @@ impl<K: ChipKind> Chip<K> {
     /// chip is idle; if the round has no room for a tile, its gathers are done.
     fn choose_block<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<Progress, Fault> {
         let budget = *self.kind.budget();
-        let has_records = allowed_error(job.frame).is_some();
         let rounds = &mut self.shared.rounds;
         if let Some(index) = rounds.gathered() {
-            let of_pixels = most_gathers(job.frame, &budget, false, budget.tile_pixels);
-            let has_room = index == rounds.filled || !has_records || rounds.has_room(of_pixels);
-            let round = rounds.rounds.get_mut(index).ok_or(Invariant::Flight.fault())?;
-            if round.resumed == round.blocks {
-                round.empty();
-            } else if has_room {
-                let block = round.waiting.values().get(round.resumed).copied();
-                round.resumed += 1;
-                self.restore_block(job, block.ok_or(Invariant::Flight.fault())?)?;
-            } else {
-                rounds.phase = Phase::Closing(0);
-            }
-            return Ok(Progress::Busy);
+            return self.choose_gathered(job, index);
         }
-        let rest = rounds.unfinished.as_ref().and_then(|rest| rest.blocks.last());
-        let pixels = rest.map_or(budget.tile_pixels, Block::pixels);
-        let of_block = most_gathers(job.frame, &budget, has_records, pixels);
-        let has_room = rounds.has_room(of_block);
+        let rest = rounds.unfinished.as_ref();
+        let next = rest.and_then(|rest| Some((rounds.tiles.values().get(rest.tile)?, rest.blocks.last()?)));
+        let gathers =
+            next.map_or(0, |(open, block)| first_gathers(job.frame, &budget, &block.window(&open.tile)));
+        let has_room = rounds.has_room(gathers);
         if rounds.unfinished.is_some() && has_room {
             return self.resume_unfinished();
         }
         let is_idle = rounds.unfinished.is_none() && has_room && rounds.accepts_tile();
         Ok(if is_idle || !rounds.flush() { Progress::Idle } else { Progress::Busy })
+    }
+
+    /// Takes up the next block of a round whose gathers are done. If its pixels' gathers have no room in the
+    /// other round, does those that wait there first.
+    fn choose_gathered<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        index: usize,
+    ) -> Result<Progress, Fault> {
+        let rounds = &mut self.shared.rounds;
+        let round = rounds.rounds.get_mut(index).ok_or(Invariant::Flight.fault())?;
+        if round.resumed == round.blocks {
+            round.empty();
+            return Ok(Progress::Busy);
+        }
+        let block = round.waiting.values().get(round.resumed).copied().ok_or(Invariant::Flight.fault())?;
+        let of_pixels = gathers_of_pixels(job.frame, rounds.tile(block.tile)?.tile.pixels());
+        if index == rounds.filled || allowed_error(job.frame).is_none() || rounds.has_room(of_pixels) {
+            let round = rounds.rounds.get_mut(index).ok_or(Invariant::Flight.fault())?;
+            round.resumed += 1;
+            self.restore_block(job, block)?;
+        } else {
+            rounds.phase = Phase::Closing(0);
+        }
+        Ok(Progress::Busy)
     }
 
     fn resume_unfinished(&mut self) -> Result<Progress, Fault> {
@@ -96,9 +109,9 @@ impl<K: ChipKind> Chip<K> {
     /// Begins the next block of the tile in flight, or puts the tile aside if the round has no room for it.
     fn begin_next_block(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let budget = *self.kind.budget();
-        let pixels = self.only_flight()?.pixels_of_next_block();
+        let window = self.only_flight()?.window_of_next_block();
         let rounds = &mut self.shared.rounds;
-        let gathers = most_gathers(frame, &budget, allowed_error(frame).is_some(), pixels);
+        let gathers = first_gathers(frame, &budget, &window);
         // A block that was halved leaves its number to its first half.
         if rounds.present.is_none() && !rounds.has_room(gathers) {
             return self.leave_tile();
@@ -131,6 +144,7 @@ impl<K: ChipKind> Chip<K> {
         job.memory.enter(Stage::Gather);
         let words = &mut WordWriter::new(job.memory, &mut round.room);
         flight.save(job.frame, &shared.sums, FLIGHT, words)?;
+        round.saved += round.room.next() - state;
         let block = round.waiting.values_mut().get_mut(number).ok_or(broken)?;
         *block = WaitingBlock { state, results: WrittenResults::NONE, tile };
         shared.rounds.tile(tile)?.waiting += 1;
