@@ -56,3 +56,61 @@ pub(super) fn read<const N: usize>(
     *newest = older;
     bytes.as_chunks().0.iter().take(count).try_for_each(&mut take)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::memory::Dram;
+
+    /// Lines before the room.
+    const FIRST: u32 = 2;
+
+    proptest! {
+        /// Two chains in one room, whose lines alternate at random.
+        #[test]
+        fn chains_are_read_from_the_newest_line_to_the_oldest(
+            written in prop::collection::vec((0..2_usize, prop::collection::vec(any::<[u8; 24]>(), 1..=5)), 0..12),
+        ) {
+            let mut lines = std::vec![Line([0xa5; LINE_BYTES]); FIRST as usize + written.len()];
+            let (mut memory, mut room) = (Dram::new(&mut lines), Room::new(FIRST, written.len() as u32));
+            let mut newest = [NONE; 2];
+            for (chain, records) in &written {
+                let records = records.iter().copied();
+                prop_assert_eq!(append(&mut memory, &mut room, &mut newest[*chain], records), Ok(()));
+            }
+            prop_assert_eq!(room.next(), room.end());
+            for (chain, newest) in newest.iter_mut().enumerate() {
+                for (_, records) in written.iter().rev().filter(|(of_chain, _)| *of_chain == chain) {
+                    let mut found: Vec<[u8; 24]> = Vec::new();
+                    prop_assert_eq!(read(&mut memory, newest, |record| { found.push(*record); Ok(()) }), Ok(()));
+                    prop_assert_eq!(&found, records);
+                }
+                prop_assert_eq!(*newest, NONE);
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_without_room_is_a_fault_and_leaves_the_chain() {
+        let mut lines = [Line::ZERO; 4];
+        let (mut memory, mut room, mut newest) = (Dram::new(&mut lines), Room::new(FIRST, 1), NONE);
+        assert_eq!(append(&mut memory, &mut room, &mut newest, [[1; 15]].into_iter()), Ok(()));
+        let second = append(&mut memory, &mut room, &mut newest, [[2; 15]].into_iter());
+        assert_eq!((second, newest), (Err(Invariant::Room.fault()), FIRST));
+    }
+
+    #[test]
+    fn a_damaged_chain_ends_in_a_fault() {
+        for older in [FIRST, FIRST + 1, u32::MAX] {
+            let mut lines = [Line::ZERO; 4];
+            lines[FIRST as usize].0[RECORD_BYTES..RECORD_BYTES + 4].copy_from_slice(&older.to_le_bytes());
+            let (mut memory, mut newest) = (Dram::new(&mut lines), FIRST);
+            let result = read(&mut memory, &mut newest, |_: &[u8; 24]| Ok(()));
+            assert_eq!(result, Err(Invariant::Room.fault()), "{older}");
+        }
+    }
+}

@@ -178,6 +178,8 @@ pub fn hilbert_cell(index: u32, bits: u32) -> [u32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -233,6 +235,14 @@ mod tests {
             for drain in [Drain::Hash, Drain::Sort] {
                 code.key(drain);
             }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_parts_of_the_curve_are_equally_long(code: u64, bits in 0..64_u32) {
+            let length = 1_u128 << (64 - bits);
+            prop_assert_eq!(HilbertCode::of_bits(code).part(bits) as u128, u128::from(code) / length);
         }
     }
 }

@@ -196,6 +196,8 @@ impl GatherTarget {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::importance::CELLS;
 
@@ -210,6 +212,37 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_target_of_a_block_decodes_to_its_parts() {
+        for block in 0..MAX_WAITING_BLOCKS as usize {
+            for index in 0..MAX_WAITING_POINTS as u16 {
+                let cell = (index as u8 ^ block as u8) % CELLS as u8;
+                for point in [PointIndex::Pixel(index), PointIndex::Record(index)] {
+                    let target = GatherTarget::of_block(block, point).in_cell(31).in_cell(cell);
+                    assert_eq!((target.block_and_point(), target.cell()), ((block, point), cell));
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn requests_and_results_decode_to_their_bytes(
+            position: u64,
+            reflection: [u8; 13],
+            target: [u8; 3],
+            brought: [f32; 3],
+        ) {
+            let target = GatherTarget::from_bytes(target);
+            let position = HilbertCode::of_bits(position);
+            let reflection = PartialReflection::from_bytes(&reflection);
+            let request = GatherRequest { position, reflection, target };
+            prop_assert_eq!(GatherRequest::from_bytes(&request.to_bytes()), request);
+            let result = GatherResult { target, brought: Vec3::from_array(brought) };
+            prop_assert_eq!(GatherResult::from_bytes(&result.to_bytes()), result);
         }
     }
 }

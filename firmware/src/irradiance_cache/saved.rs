@@ -165,3 +165,141 @@ impl GatherSums {
         Ok(Self { coefficients, mean, translation: [along, across], rotation: [about, about_other] })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use photoncard_shared::address::{Line, Structure};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kind::Entries;
+    use crate::memory::{Dram, Room, WORDS};
+    use crate::scene::Surface;
+
+    const POINTS: usize = 64;
+    const LINES: usize = most_cache_words(POINTS).div_ceil(WORDS);
+    const WINDOW: Window = Window { x0: 16, x1: 40, y0: 32, y1: 48 };
+
+    type Cache = IrradianceCache<Entries<POINTS>>;
+
+    fn vector() -> impl Strategy<Value = Vec3> {
+        any::<[f32; 3]>().prop_map(Vec3::from_array)
+    }
+
+    fn sum() -> impl Strategy<Value = ColourSum> {
+        any::<[u32; 6]>().prop_map(ColourSum::of_words)
+    }
+
+    fn content() -> impl Strategy<Value = Content> {
+        let strongest = any::<([u8; 4], u8, [u8; 2])>().prop_map(|(light, cell, second)| Strongest {
+            light: Rgbe(light),
+            cell,
+            second,
+        });
+        let coefficients = prop::array::uniform32(any::<[u16; 2]>());
+        let pair = || [sum(), sum()];
+        let gathering = (strongest, coefficients, sum(), pair(), pair()).prop_map(
+            |(strongest, coefficients, mean, translation, rotation)| {
+                Content::Gathering(strongest, GatherSums { coefficients, mean, translation, rotation })
+            },
+        );
+        let pair = || [vector(), vector()];
+        let gathered = (vector(), pair(), pair()).prop_map(|(mean, translation, rotation)| {
+            Content::Gathered(Irradiance { mean, translation, rotation })
+        });
+        prop_oneof![gathering, gathered]
+    }
+
+    fn record() -> impl Strategy<Value = Record> {
+        (vector(), vector(), any::<u32>(), any::<[f32; 3]>(), content()).prop_map(
+            |(position, normal, packed, [magnitude, distance, radius], content)| {
+                let geometric_normal = PackedNormal(packed);
+                Record { position, normal, geometric_normal, magnitude, distance, radius, content }
+            },
+        )
+    }
+
+    /// Cache of [`WINDOW`] with these records at points of the lattice.
+    fn cache(divided: [u32; 2], records: &[Option<Record>]) -> Cache {
+        let mut cache = Cache::new();
+        cache.begin(&WINDOW).unwrap();
+        cache.roots.iter_mut().zip(divided).for_each(|(root, divided)| root.1 = divided);
+        for (number, record) in (0..).zip(records) {
+            let point = LatticePoint { x: 16 + 2 * number, y: 32 + number };
+            cache.records.insert(point, *record).unwrap();
+        }
+        cache
+    }
+
+    /// Saves a cache in lines of memory. Returns them with the number of words, rounded up to lines.
+    fn saved(cache: &Cache) -> Result<(Vec<Line>, usize), Fault> {
+        let mut lines = std::vec![Line::ZERO; LINES + 1];
+        let (mut memory, mut room) = (Dram::new(&mut lines), Room::new(1, LINES as u32));
+        let words = &mut WordWriter::new(&mut memory, &mut room);
+        cache.save(words)?;
+        words.end()?;
+        let used = (room.next() - 1) as usize;
+        Ok((lines, used))
+    }
+
+    fn restored(lines: &mut [Line], window: &Window) -> Result<Cache, Fault> {
+        // What the cache held before is of no consequence.
+        let mut cache = cache([7; 2], &[None; 3]);
+        let mut memory = Dram::new(lines);
+        cache.restore(window, &mut WordReader::new(&mut memory, Structure::Waiting, 1))?;
+        Ok(cache)
+    }
+
+    fn entries(cache: &Cache) -> Vec<(LatticePoint, Option<Record>)> {
+        let entry = |index| cache.records.entry(index).map(|(point, record)| (*point, *record));
+        (0..cache.records.entries()).filter_map(entry).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn a_cache_is_restored_as_it_was_saved(
+            divided: [u32; 2],
+            records in prop::collection::vec(prop::option::weighted(0.8, record()), 0..POINTS),
+        ) {
+            let cache = cache(divided, &records);
+            let (mut lines, _) = saved(&cache).unwrap();
+            let restored = restored(&mut lines, &WINDOW).unwrap();
+            prop_assert_eq!(entries(&restored), entries(&cache));
+            // Without records nothing is interpolated, so that the cells are dropped.
+            prop_assert_eq!(restored.roots, if records.is_empty() { heapless::Vec::new() } else { cache.roots });
+        }
+
+        #[test]
+        fn a_full_cache_takes_no_more_words_than_the_bound(record in record()) {
+            let (_, used) = saved(&cache([0; 2], &[Some(record); POINTS])).unwrap();
+            let is_gathering = matches!(record.content, Content::Gathering(..));
+            prop_assert!(used <= LINES && (!is_gathering || used + 1 >= LINES), "{used} of {LINES}");
+        }
+    }
+
+    #[test]
+    fn a_record_that_is_surveyed_is_not_saved() {
+        let record = Record::new(&Surface::white(Vec3::ONE, Vec3::Z, 1.0), 0.5);
+        assert_eq!(saved(&cache([0; 2], &[None, Some(record)])).err(), Some(Invariant::Record.fault()));
+    }
+
+    #[test]
+    fn lines_that_hold_no_saved_cache_of_the_window_are_a_fault() {
+        let (lines, _) = saved(&cache([1, 2], &[None; 3])).unwrap();
+        let words = |entries: u32, code: u32| {
+            let mut lines = lines.clone();
+            // The first record's code follows the number of records, the cells and the point's coordinates.
+            for (word, value) in [(0, entries), (5, code)] {
+                lines[1].0[4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+            }
+            lines
+        };
+        assert!(restored(&mut words(3, NO_RECORD), &WINDOW).is_ok());
+        assert!(restored(&mut words(3, GATHERED + 1), &WINDOW).is_err());
+        assert!(restored(&mut words(u32::MAX, NO_RECORD), &WINDOW).is_err());
+        let many_cells = Window { x0: 0, x1: 400, y0: 0, y1: 400 };
+        assert_eq!(restored(&mut words(3, NO_RECORD), &many_cells).err(), Some(Invariant::Record.fault()));
+    }
+}
