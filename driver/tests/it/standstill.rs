@@ -14,7 +14,7 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::Header;
 use photoncard_shared::layout::PhotonGrid;
-use photoncard_shared::message::{Command, FrameParameters, PIXEL_BYTES, Reply, Tile};
+use photoncard_shared::message::{Command, Drain, FrameParameters, PIXEL_BYTES, Reply, Tile};
 use photoncard_shared::transport::Transport;
 
 use crate::scripted_card::{Answer, Card, sound};
@@ -144,6 +144,24 @@ fn keeping(command: &Command) -> Option<Reply<'static>> {
             }
             reply => reply,
         }),
+    }
+}
+
+#[test]
+fn of_several_tiles_whose_gathers_wait_in_card_memory_none_is_blamed_for_a_loss() {
+    for (drain, tiles, blamed) in [(Drain::Sort, 2, 1), (Drain::Buckets, 3, 0), (Drain::Buckets, 1, 1)] {
+        let frame = FrameParameters { drain, ..frame() };
+        let mut bench = Bench::new(&frame);
+        bench.waiting = (0..tiles).map(|id| Tile { id, ..TILE }).collect();
+        bench.go(&mut Card::new(sound), Duration::from_secs(5)).unwrap();
+        bench.greet_again();
+        let lost = bench.events.iter().filter_map(|event| match event {
+            Event::TileLost { was_at_work, .. } => Some(*was_at_work),
+            _ => None,
+        });
+        let lost: Vec<bool> = lost.collect();
+        let at_work = lost.iter().filter(|&&was_at_work| was_at_work).count();
+        assert_eq!((lost.len(), at_work), (tiles as usize, blamed), "{drain:?}");
     }
 }
 
