@@ -16,7 +16,7 @@
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
 //! | `Points` | nothing; it holds the gather points of the tile whose rays are being cast |
 //! | `Gathers` | nothing; it is the queue, in which each gather names its tile in flight |
-//! | `Rounds` | in a frame in rounds ([`Drain::Buckets`](photoncard_shared::message::Drain::Buckets)), its counters; its blocks in card memory |
+//! | `Rounds` | in a frame in rounds ([`Drain::Buckets`]), its counters; its blocks in card memory |
 //! | `RecordStore` | nothing; it locates the irradiance records that frames of one picture share |
 
 mod adaptive;
