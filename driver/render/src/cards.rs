@@ -364,19 +364,17 @@ impl RenderSettings {
     /// Creates the scheduler of the tiles for `cards` cards. If memory is modelled, no tile is rendered
     /// twice, because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
-        let is_in_shares = self.schedule.order == GatherOrder::Buckets;
+        let deals_shares = self.schedule.order == GatherOrder::Buckets;
         // The counts of modelled caches depend on the order of the tiles, so the order of the picture is
         // kept.
         if self.modelled_caches().is_some() {
-            let scheduler = Scheduler::new(tiles, cards);
-            return if is_in_shares { scheduler.in_shares() } else { scheduler };
+            return Scheduler::new(tiles, cards).in_shares(deals_shares);
         }
         let ordered = match self.schedule.focus {
             Some(focus) => near(tiles, focus),
             None => spread(tiles),
         };
-        let scheduler = Scheduler::new(ordered, cards).with_helpers();
-        let scheduler = if is_in_shares { scheduler.in_shares() } else { scheduler };
+        let scheduler = Scheduler::new(ordered, cards).with_helpers().in_shares(deals_shares);
         match self.cards.verify {
             Some(share) => scheduler.verifying(share, self.integrator.seed),
             None => scheduler,

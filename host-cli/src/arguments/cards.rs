@@ -48,11 +48,11 @@ pub(crate) struct CardOptions {
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
-    /// Write every memory read of an emulated chip to a file for a simulator of caches or of DRAM, compressed
-    /// by gzip; a large picture has billions of reads: use --crop
+    /// Write every access to memory of an emulated chip to a file for a simulator of caches or of DRAM, compressed
+    /// by gzip; a large picture has billions of accesses: use --crop
     #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
-    /// Reads that the trace contains, and the trace's format
+    /// Accesses that the trace contains, and the trace's format
     #[arg(
         long,
         default_value = TraceFormat::default().name(),
@@ -61,8 +61,8 @@ pub(crate) struct CardOptions {
         hide_short_help = true
     )]
     trace_format: TraceFormat,
-    /// Add the structure, the stage and the number of bytes to each read in a trace for Dinero, which ignores
-    /// them
+    /// Add the structure, the stage and the number of bytes to each access in a trace for Dinero, which
+    /// ignores them
     #[arg(long, requires = "trace", hide_short_help = true)]
     trace_labels: bool,
 }

@@ -67,8 +67,8 @@ type Pass = (u32, GatherOrder, &'static str);
 
 /// Sequences of passes, whose cards may stay or change.
 fn passes() -> impl Strategy<Value = Vec<Pass>> {
-    use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
-    let order = || prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
+    use GatherOrder::{Buckets, DirectionBins, Hash, Naive, Sort, Tiled};
+    let order = || prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort, Buckets]);
     let cards = || {
         prop::sample::select(vec![
             "emulated:1",
@@ -149,6 +149,23 @@ fn records_are_gathered_once_while_camera_scene_settings_and_cards_stay() {
             assert_eq!((gathers, records), (whole.statistics.gathers, all), "{on}");
         }
     }
+}
+
+#[test]
+fn records_are_kept_where_gathers_wait_in_the_same_memory() {
+    let scene = everything();
+    let settings = with_records();
+    let mut renderer = Renderer::default();
+    let mut picture = None;
+    use GatherOrder::{Buckets, Sort};
+    for (samples, order) in [(1, Buckets), (2, Buckets), (3, Sort), (4, Buckets)] {
+        let settings = settings.clone().with(|s| s.schedule.order = order);
+        let next = pass(&mut renderer, &scene, &settings, (samples, picture.take()));
+        assert_eq!(next.statistics.kept_records > 0, samples == 2, "{samples}");
+        picture = Some(next);
+    }
+    let whole = render_or_panic(&everything(), &settings.with(|s| s.integrator.samples = 4));
+    assert!(picture.expect("a pass").film.sums().eq(whole.film.sums()));
 }
 
 #[test]

@@ -219,6 +219,18 @@ fn as_many_blocks_wait_as_have_room() {
     }
 }
 
+/// The figures of `docs/memory.md`.
+#[test]
+fn the_reference_chip_needs_one_megabyte_for_gathers_that_wait_and_more_with_records() {
+    let megabytes = |irradiance_error| {
+        let world = World::new(|s| s.integrator.irradiance_error = irradiance_error);
+        let frame = FrameParameters { drain: Drain::Buckets, ..world.frame };
+        let lines = least_waiting_lines(&frame, EmulatedKind::Reference.emulated().budget());
+        (lines * LINE_BYTES as u64 + 50_000) / 100_000
+    };
+    assert_eq!([megabytes(None), megabytes(Some(0.1))], [10, 24]);
+}
+
 /// The card refuses the frame, and the host says what helps.
 #[test]
 fn a_frame_whose_gathers_have_no_room_is_refused() {

@@ -28,6 +28,8 @@ pub(super) struct Card {
     /// Indices of the tiles assigned to the card. The card works on the first of them, up to its number of
     /// tiles in flight.
     pub(super) tiles: Vec<usize>,
+    /// Maximum number of tiles that the card has had at a time.
+    pub(super) most_tiles: u32,
     /// Number of tiles that the card receives one at a time, because it was lost with several.
     pub(super) singly: usize,
     /// Indices of the waiting tiles reserved for the card, which rendered them in an earlier pass.
@@ -44,6 +46,7 @@ impl Card {
             standing: Standing::Living,
             lie: None,
             tiles: Vec::new(),
+            most_tiles: 0,
             singly: 0,
             at_home: VecDeque::new(),
             counters: Counters::ZERO,

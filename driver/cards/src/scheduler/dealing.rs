@@ -43,7 +43,9 @@ impl Scheduler {
             .or_else(|| self.next_to_help(card, now))?;
         let entry = &mut self.entries[index];
         entry.copies.push(Copy { card, since: now });
-        self.cards[card].tiles.push(index);
+        let at = &mut self.cards[card];
+        at.tiles.push(index);
+        at.most_tiles = at.most_tiles.max(at.tiles.len() as u32);
         Some(Assignment { tile: entry.tile, is_suspect: !entry.crashes.is_empty() })
     }
 

@@ -139,11 +139,12 @@ impl Scheduler {
         Self { has_helpers: true, ..self }
     }
 
-    /// Gives each card its share of the tiles at once, as far as it accepts them, instead of a few at a time:
-    /// a card whose gathers wait in card memory reads less the more tiles it has.
+    /// With `deals_shares`, gives each card its share of the tiles at once, as far as it accepts them, instead
+    /// of a few at a time: a card whose gathers wait in card memory reads less the more tiles it has. The card
+    /// works on them together.
     #[must_use]
-    pub fn in_shares(self) -> Self {
-        Self { deals_shares: true, ..self }
+    pub fn in_shares(self, deals_shares: bool) -> Self {
+        Self { deals_shares, ..self }
     }
 
     /// Requires that a second card verify a share (0 to 1) of the tiles, at least one tile. A hash of seed
@@ -189,7 +190,7 @@ impl Scheduler {
         let took = now.saturating_sub(since);
         self.times.count(took);
         let at = &mut self.cards[card];
-        at.count_time(took, &tile.counters);
+        at.count_time(if self.deals_shares { took / at.most_tiles.max(1) } else { took }, &tile.counters);
         at.singly = at.singly.saturating_sub(1);
         let entry = &mut self.entries[index];
         if !entry.is_open() || at.standing == Standing::GivenUp {
@@ -283,8 +284,10 @@ impl Scheduler {
         let since = copies.remove(copy).since;
         let tiles = &mut self.cards[card].tiles;
         tiles.retain(|&tile| tile != index);
-        // The card can start its next tile no earlier than now.
-        if let Some(&next) = tiles.first() {
+        // The card can start its next tile no earlier than now, unless it works on all of them.
+        if let Some(&next) = tiles.first()
+            && !self.deals_shares
+        {
             let copies = &mut self.entries[next].copies;
             copies
                 .iter_mut()

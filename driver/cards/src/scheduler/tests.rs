@@ -291,7 +291,7 @@ fn a_tile_with_two_crashes_waits_until_all_others_are_done() {
 
 #[test]
 fn a_card_that_is_lost_with_several_tiles_in_shares_receives_as_many_one_at_a_time() {
-    let mut scheduler = scheduler(9, 2).in_shares();
+    let mut scheduler = scheduler(9, 2).in_shares(true);
     let taken = |scheduler: &mut Scheduler, card| -> Vec<u32> {
         std::iter::from_fn(|| take(scheduler, card, SECOND)).collect()
     };
@@ -305,6 +305,25 @@ fn a_card_that_is_lost_with_several_tiles_in_shares_receives_as_many_one_at_a_ti
         answer(&mut scheduler, 0, id, 0, SECOND);
     }
     assert_eq!([taken(&mut scheduler, 1), taken(&mut scheduler, 0)], [[5, 6], [7, 8]]);
+}
+
+#[test]
+fn tiles_in_shares_take_the_time_of_a_round_together() {
+    let mut scheduler = scheduler(12, 2).with_helpers().in_shares(true);
+    let taken = |scheduler: &mut Scheduler, card, now| -> Vec<u32> {
+        std::iter::from_fn(|| take(scheduler, card, now)).collect()
+    };
+    assert_eq!(taken(&mut scheduler, 0, Duration::ZERO), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(taken(&mut scheduler, 1, Duration::ZERO), [6, 7, 8, 9, 10, 11]);
+    for id in 0..6 {
+        answer(&mut scheduler, 0, id, 0, 12 * SECOND);
+    }
+    // Six tiles of ten rays in twelve seconds.
+    let of_ray = scheduler.slowest(0).unwrap() / SLOWER_THAN_BEFORE;
+    assert!((of_ray - 0.2).abs() < 1e-9, "{of_ray}");
+    // The slower card has another twelve seconds for its round.
+    assert_eq!(take(&mut scheduler, 0, 23 * SECOND), None);
+    assert_eq!(take(&mut scheduler, 0, 25 * SECOND), Some(6));
 }
 
 #[test]

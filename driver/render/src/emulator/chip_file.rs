@@ -100,12 +100,13 @@ impl Emulated {
     }
 
     /// Reads the capacities of a kind of chip from a JSON object. Capacities that the object does not state
-    /// are those of the reference chip.
+    /// are those of the reference chip; but no block waits if the stated capacities have no room for it.
     ///
     /// # Errors
     /// The first capacity that is unknown, out of its range or contradicts others.
     pub fn from_json(text: &str) -> Result<Self, ChipError> {
         let stated: BTreeMap<String, Value> = serde_json::from_str(text)?;
+        let states_waiting = stated.contains_key("waiting_blocks");
         let mut capacities = Self::like::<Reference>().to_json();
         for (name, value) in stated {
             let Some((name, range)) = RANGES.into_iter().find(|(known, _)| *known == name) else {
@@ -118,7 +119,10 @@ impl Emulated {
             capacities[name] = value;
         }
         let points = serde_json::from_value(capacities["gather_points"].take())?;
-        let kind = Self { budget: serde_json::from_value(capacities)?, points };
+        let mut kind = Self { budget: serde_json::from_value(capacities)?, points };
+        if !states_waiting && (kind.points_of_block() > MAX_WAITING_POINTS || kind.buckets() == 0) {
+            kind.budget.waiting_blocks = 0;
+        }
         kind.check()?;
         Ok(kind)
     }
@@ -135,7 +139,7 @@ impl Emulated {
     fn check(&self) -> Result<(), ChipError> {
         let Budget { photon_cache_bytes, scene_cache_bytes, irradiance_records, in_flight, tiles, .. } =
             self.budget;
-        let Budget { waiting_blocks, tile_pixels, gather_queue, .. } = self.budget;
+        let waiting_blocks = self.budget.waiting_blocks;
         let contradictory =
             |name, value, rule: &str| Err(ChipError::Contradictory { name, value, rule: rule.to_owned() });
         for (name, bytes) in
@@ -151,12 +155,11 @@ impl Emulated {
         if in_flight > tiles {
             return contradictory("in_flight", in_flight, &format!("at most {tiles}, the number of tiles"));
         }
-        let points = tile_pixels.max(irradiance_records);
-        if waiting_blocks > 0 && points > MAX_WAITING_POINTS {
+        if waiting_blocks > 0 && self.points_of_block() > MAX_WAITING_POINTS {
             let rule = format!("0, or at most {MAX_WAITING_POINTS} tile_pixels and irradiance_records");
             return contradictory("waiting_blocks", waiting_blocks, &rule);
         }
-        if waiting_blocks > 0 && gather_buckets(gather_queue) == 0 {
+        if waiting_blocks > 0 && self.buckets() == 0 {
             let rule = "0, or a gather_queue of 5 gathers or more";
             return contradictory("waiting_blocks", waiting_blocks, rule);
         }
@@ -170,6 +173,16 @@ impl Emulated {
             return contradictory("sram_bytes", most, &rule);
         }
         Ok(())
+    }
+
+    /// Maximum number of points of a block whose gathers wait.
+    fn points_of_block(&self) -> u32 {
+        self.budget.tile_pixels.max(self.budget.irradiance_records)
+    }
+
+    /// Number of buckets of waiting gathers for which the queue has room.
+    fn buckets(&self) -> usize {
+        gather_buckets(self.budget.gather_queue)
     }
 
     /// On-chip memory of the firmware, including caches and stack, bytes.
@@ -192,7 +205,7 @@ impl Emulated {
         let blocks = self.budget.waiting_blocks as usize;
         let [pixels, queue, records, flights] =
             [tile_pixels, gather_queue, irradiance_records, in_flight].map(|entries| entries as usize);
-        let buckets = if blocks == 0 { 0 } else { gather_buckets(gather_queue) };
+        let buckets = if blocks == 0 { 0 } else { self.buckets() };
         let entries = [pixels, gather_candidates(neighbors), queue, records, self.points, buckets, blocks];
         let [one, two] = [extrapolated(&entries, &probes::<1>()), extrapolated(&entries, &probes::<2>())];
         std::array::from_fn(|i| {
@@ -311,14 +324,16 @@ mod tests {
             (r#"{"scene_cache_bytes": 1000}"#, ["scene_cache_bytes is 1000", "multiple of 512"]),
             (r#"{"irradiance_records": 100}"#, ["irradiance_records is 100", "power of two"]),
             (r#"{"in_flight": 5}"#, ["in_flight is 5", "at most 4"]),
-            (r#"{"tile_pixels": 8192}"#, ["waiting_blocks is 64", "at most 4096"]),
-            (r#"{"gather_queue": 4}"#, ["waiting_blocks is 64", "5 gathers"]),
+            (r#"{"tile_pixels": 8192, "waiting_blocks": 64}"#, ["waiting_blocks is 64", "at most 4096"]),
+            (r#"{"gather_queue": 4, "waiting_blocks": 1}"#, ["waiting_blocks is 1", "5 gathers"]),
             (r#"{"gather_points": 256}"#, ["gather_points is 256", "at least 512"]),
             (r#"{"gather_queue": 1000000}"#, ["sram_bytes is 1048576", "buffers, caches and stack"]),
         ] {
             let said = Emulated::from_json(text).unwrap_err().to_string();
             assert!(words.iter().all(|word| said.contains(word)), "{text}: {said}");
         }
+        let without_room = Emulated::from_json(r#"{"gather_queue": 4}"#).unwrap();
+        assert_eq!(without_room.budget.waiting_blocks, 0);
         assert!(matches!(Emulated::read("/dev/zero".as_ref()), Err(ChipError::Syntax(_))));
         assert!(matches!(Emulated::read("absent".as_ref()), Err(ChipError::Unreadable(_))));
     }

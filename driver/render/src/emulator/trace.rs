@@ -34,18 +34,18 @@ const FLUSH: u8 = 4;
 /// Format of a trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TraceFormat {
-    /// Reads above the caches, for Dinero.
+    /// Accesses above the caches, for Dinero.
     #[default]
     Dinero,
-    /// Lines fetched from DRAM, for Ramulator 2's load-store trace.
+    /// Lines read from and written to DRAM, for Ramulator 2's load-store trace.
     Ramulator,
-    /// Lines fetched from DRAM, for `DRAMsim3`. Each fetch is one cycle after the previous one, so that the
+    /// Lines read from and written to DRAM, for `DRAMsim3`. Each access is one cycle after the previous one, so that the
     /// DRAM always has work.
     Dramsim3,
 }
 
 choices!(TraceFormat {
-    Dinero = "dinero": "Reads above the caches, for Dinero",
+    Dinero = "dinero": "Accesses above the caches, for Dinero",
     Ramulator = "ramulator": "Lines from DRAM, for Ramulator 2",
     Dramsim3 = "dramsim3": "Lines from DRAM, for DRAMsim3",
 });
@@ -64,7 +64,7 @@ pub struct TraceSettings {
     pub path: PathBuf,
     /// Format of the lines.
     pub format: TraceFormat,
-    /// True if each read in a trace of [`TraceFormat::Dinero`] is followed by its structure, stage and byte
+    /// True if each access in a trace of [`TraceFormat::Dinero`] is followed by its structure, stage and byte
     /// count.
     pub has_labels: bool,
 }

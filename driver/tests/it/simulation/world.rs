@@ -207,9 +207,8 @@ impl Fixture {
     /// Scheduler of the picture's tiles, a share of which is verified.
     pub(crate) fn scheduler(&self, cards: usize, verify: Option<f64>, seed: u32) -> Scheduler {
         let tiles = tiles(self.settings.window(), self.settings.tile_side(&[]), self.settings.schedule.order);
-        let scheduler = Scheduler::new(tiles, cards).with_helpers();
-        let is_in_shares = self.settings.schedule.order == GatherOrder::Buckets;
-        let scheduler = if is_in_shares { scheduler.in_shares() } else { scheduler };
+        let deals_shares = self.settings.schedule.order == GatherOrder::Buckets;
+        let scheduler = Scheduler::new(tiles, cards).with_helpers().in_shares(deals_shares);
         match verify {
             Some(share) => scheduler.verifying(share, seed),
             None => scheduler,
