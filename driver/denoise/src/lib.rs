@@ -72,8 +72,8 @@ impl Denoiser {
     ///
     /// Albedo and normals are denoised first, each alone, and then guide the denoising of the radiance.
     /// Because they have little noise, the library's smaller network (quality *balanced*) denoises them; this
-    /// changes the picture's error by 2 % at most. Pixels around which nothing but the environment is seen
-    /// keep their radiance: they have no noise, and the network would change it. `threads` is the maximum number of threads; `None` for one
+    /// changes the picture's error by 2 % at most. Pixels around which no eye ray hits a surface keep their
+    /// radiance: the environment has no noise, and the network would change it. `threads` is the maximum number of threads; `None` for one
     /// per core.
     ///
     /// # Errors
@@ -91,9 +91,9 @@ impl Denoiser {
         let size = [film.window().width() as usize, film.window().height() as usize];
         let device = Device::new(&self.library, threads)?;
         let [mut radiance, mut albedo, mut normal] = [const { Vec::new() }; 3];
-        let mut sees_surface = Vec::new();
+        let mut hits_surface = Vec::new();
         for pixel in film.pixels() {
-            sees_surface.push(pixel.depth.is_finite());
+            hits_surface.push(pixel.depth.is_finite());
             radiance.push(pixel.radiance);
             albedo.push(pixel.albedo);
             normal.push(pixel.normal);
@@ -106,7 +106,7 @@ impl Denoiser {
         let images = [("color", &*radiance), ("albedo", &*albedo), ("normal", &*normal)];
         let input = Input { images: &images, switches: &["hdr", "cleanAux"], quality: Quality::High };
         let mut denoised = device.run(size, &input, must_stop)?;
-        for pixel in background::pixels(&sees_surface, size) {
+        for pixel in background::pixels(&hits_surface, size) {
             denoised[pixel] = radiance[pixel];
         }
         Ok(denoised)

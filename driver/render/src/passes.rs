@@ -36,7 +36,7 @@ pub struct Aim {
 
 /// A picture rendered by passes, and the reason why they ended.
 pub struct Passes {
-    /// Picture of all complete passes. Its statistics describe the work of the last pass.
+    /// Picture of all complete passes. Its statistics have the times of all, and the work of the last.
     pub rendering: Rendering,
     /// Estimated noise, as in [`Aim::noise`]; `None` after a single pass.
     pub noise: Option<f64>,

@@ -24,7 +24,7 @@ use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
-use crate::render::features::features;
+use crate::render::features::{Features, features};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 
 /// Purpose for which the light of a path is computed.
@@ -138,9 +138,15 @@ impl<K: ChipKind> Flight<K> {
         let pass = self.pass();
         let context = &mut job.context(&mut self.counters);
         let has_rays = match eye::view(context, at)? {
-            Sight::Background(radiance) => {
+            Sight::Background { radiance, depth } => {
                 let light = radiance * per_unit(context);
                 completion.add(context.frame, as_what, Component::Direct, light);
+                if let Some(depth) = depth
+                    && completion.path == 0
+                    && matches!(as_what, Use::Term(_))
+                {
+                    completion.view.add(&context.scene.header, &Features::NOTHING, depth);
+                }
                 false
             }
             Sight::Surface(view) => {

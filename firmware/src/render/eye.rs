@@ -44,9 +44,14 @@ pub struct View {
 pub enum Sight {
     /// A surface.
     Surface(View),
-    /// The environment. The radiance, W/(sr m^2), includes the throughput of the eye path; it is zero without
-    /// an environment, and for a path that contributes nothing.
-    Background(Vec3),
+    /// The environment.
+    Background {
+        /// Radiance, W/(sr m^2), times the throughput of the eye path. It is zero without an environment, and
+        /// for a path that contributes nothing.
+        radiance: Vec3,
+        /// Depth of the eye ray's hit along the view axis, metres; `None` if the ray itself leaves the scene.
+        depth: Option<f32>,
+    },
 }
 
 impl Sight {
@@ -54,7 +59,7 @@ impl Sight {
     pub fn surface(self) -> Option<View> {
         match self {
             Self::Surface(view) => Some(view),
-            Self::Background(_) => None,
+            Self::Background { .. } => None,
         }
     }
 }
@@ -79,7 +84,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     };
     let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::Specular);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
-        return background(context, &path);
+        return background(context, &path, None);
     };
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut surface = Surface::NOWHERE;
@@ -87,14 +92,16 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     let is_first = surface.specular.is_none();
     // Only the eye path can repeat a random choice between layers.
     let is_stored = is_first && surface.probability >= 1.0;
+    let along_axis = ray.direction.dot(context.frame.camera.forward.into());
     if !is_first {
-        match path.follow(context, &mut surface, &mut hit, &random)? {
+        let end = path.follow(context, &mut surface, &mut hit, &random)?;
+        let depth = Some(path.first_distance * along_axis);
+        match end {
             PathEnd::Surface => {}
-            PathEnd::Escaped => return background(context, &path),
-            PathEnd::Lost => return Ok(Sight::Background(Vec3::ZERO)),
+            PathEnd::Escaped => return background(context, &path, depth),
+            PathEnd::Lost => return Ok(Sight::Background { radiance: Vec3::ZERO, depth }),
         }
     }
-    let along_axis = ray.direction.dot(context.frame.camera.forward.into());
     Ok(Sight::Surface(View {
         depth: if is_first { depth(context, &surface) } else { path.first_distance * along_axis },
         surface: surface.dimmed(path.throughput),
@@ -104,10 +111,14 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }))
 }
 
-/// Radiance of the environment at the end of a path that has left the scene, times the path's throughput.
-fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
+/// Sight of the environment at the end of a path that has left the scene.
+fn background<M: MemoryPort>(
+    context: &mut Context<M>,
+    path: &SpecularPath,
+    depth: Option<f32>,
+) -> Result<Sight, Fault> {
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
-    Ok(Sight::Background(radiance * path.throughput))
+    Ok(Sight::Background { radiance: radiance * path.throughput, depth })
 }
 
 /// Reads the surface at a stored hit of the eye ray through position `film` of the picture into `surface`.

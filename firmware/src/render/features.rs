@@ -29,7 +29,7 @@ pub struct Features {
 
 impl Features {
     /// Features where nothing is seen.
-    const NOTHING: Self = Self { albedo: Vec3::ZERO, normal: Vec3::ZERO };
+    pub(crate) const NOTHING: Self = Self { albedo: Vec3::ZERO, normal: Vec3::ZERO };
 
     fn of(surface: &Surface) -> Self {
         Self { albedo: surface.reflector().albedo(), normal: surface.normal }

@@ -49,8 +49,14 @@ pub(super) enum MaxDistance {
 impl PhotonOptions {
     /// Returns `others`, with flags for the photon settings that these options state.
     pub(super) fn stated(&self, others: Stated) -> Stated {
-        let [photons, caustic_photons] = [self.photons, self.caustic_photons].map(|count| count.is_some());
-        Stated { photons, caustic_photons, neighbors: self.neighbors.is_some(), ..others }
+        // A gather in the caustic map needs the map.
+        let caustic_photons = self.caustic_photons.is_some() || self.caustic_neighbors.is_some();
+        Stated {
+            photons: self.photons.is_some(),
+            caustic_photons,
+            neighbors: self.neighbors.is_some(),
+            ..others
+        }
     }
 
     /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.

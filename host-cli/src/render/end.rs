@@ -1,5 +1,6 @@
 //! Message about the end of a render with `--time` or `--noise`, which adds passes of samples up to an aim.
 
+use photoncard_driver::quality::Fit;
 use photoncard_driver::render::{Aim, Ending, Statistics};
 use serde_json::Value;
 
@@ -52,16 +53,20 @@ fn percent(share: f64) -> String {
 }
 
 /// Returns the options that replace `--time` and `--noise` to render the picture of `statistics` in one pass.
-/// `is_fitted` is true if a pilot render has chosen settings.
-pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
+/// `fit` has the settings that a pilot render has chosen.
+pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, fit: Option<&Fit>) -> String {
+    let is_fitted = fit.is_some();
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let is_timed = is_fitted && options.samples.aim().is_some_and(|aim| aim.time.is_some());
+    let has_fewer_caustics = is_timed && statistics.caustic_gathers > 0;
+    let has_no_caustic_map = fit.is_some_and(|fit| fit.max_caustic_photons == 0)
+        && pixels.get("caustic-photons").and_then(Value::as_u64) == Some(0);
     // Each option with whether it is needed, and the words that replace it if its setting has no value.
     let options_of_settings = [
         ("spp", true, ""),
         ("planned-spp", !options.states_planned_samples(), ""),
         ("photons", is_fitted && !stated.photons, ""),
-        ("caustic-photons", is_timed && !stated.caustic_photons && statistics.caustic_gathers > 0, ""),
+        ("caustic-photons", !stated.caustic_photons && (has_fewer_caustics || has_no_caustic_map), ""),
         ("gather-rays", is_fitted && !stated.gather_rays, ""),
         ("shadow-rays", is_fitted && !stated.shadow_rays, ""),
         ("ic-error", is_fitted && !stated.cache, if is_timed { "--irradiance-cache off" } else { "" }),

@@ -157,7 +157,11 @@ pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Ve
         let most = fit.gather_rays;
         format!("no more than {most} gather rays a pixel; this scene would take {more} (a better --quality)")
     });
-    [gain, photons, gather_rays].into_iter().flatten().collect()
+    let caustics = (fit.max_caustic_photons == 0 && settings.photons.caustic_photons == Some(0)).then(|| {
+        "gather rays bring caustics, which are soft: no caustic map (--caustic-photons N makes one)"
+            .to_owned()
+    });
+    [gain, photons, gather_rays, caustics].into_iter().flatten().collect()
 }
 
 /// Text about the contents of a scene and its view.

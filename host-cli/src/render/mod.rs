@@ -77,7 +77,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let (rendering, end) = result.inspect_err(|error| end_early(error, &progress, &options.outputs))?;
     let fit = found.into_inner().flatten();
     let (inputs, quality) = (input::provenance(&options.scene), options.quality);
-    let at_once = at_once(options, &rendering.statistics, fit.is_some());
+    let at_once = at_once(options, &rendering.statistics, fit.as_ref());
     let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None, circumstances };
     finish(options, &options.outputs, finished)?;
     let Some(end) = end else { return Ok(()) };

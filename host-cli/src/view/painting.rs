@@ -124,12 +124,13 @@ impl View {
 
     /// Records the settings that pilot renders have found.
     pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
-        let photons = self.wish.settings.photons.count;
+        let of_maps = |settings: &RenderSettings| (settings.photons.count, settings.photons.caustic_photons);
+        let before = of_maps(&self.wish.settings);
         if let Some(fit) = fit {
             self.wish.fit(fit);
             self.start.wish.fit(fit);
         }
-        let has_other_photons = self.wish.settings.photons.count != photons;
+        let has_other_photons = of_maps(&self.wish.settings) != before;
         if has_other_photons {
             self.begin_picture();
         }

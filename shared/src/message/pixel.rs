@@ -53,7 +53,8 @@ pub struct Pixel {
     /// Mean unit normal of the surfaces that the samples see, in world space, towards the eye. A sample that
     /// sees no surface counts as 0.
     pub normal: [f32; 3],
-    /// Mean depth, metres along the view axis, over the samples that see a surface; infinite if none does.
+    /// Mean depth, metres along the view axis, over the samples whose eye ray hits a surface, of any kind;
+    /// infinite if none does.
     pub depth: f32,
 }
 

@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 HEADS = ("room", "CPU s asked", "program", "CPU s", "relMSE", "FLIP", "mean", "median", "95th percentile")
 WORST = 0.001
 # Settings of photoncard's reference: many photons, and nothing that pixels share.
-OWN = "--photons 8000000 --gather-rays 4 --shadow-rays 2 --irradiance-cache off --adaptive off".split()
+OWN = "--photons 8000000 --photons-for camera --gather-rays 4 --shadow-rays 2 --irradiance-cache off --adaptive off".split()
 # Samples of the renders by which the cost of other programs is measured. Mitsuba compiles its kernels in the first of them.
 SHORT = (1, 5)
 

@@ -9,7 +9,8 @@ use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Coat, Encoding, Image, Layers, Material, NormalMap, Reflection, Scene, Texture, Triangle,
+    Camera, Coat, Encoding, Environment, Image, Layers, Material, NormalMap, Reflection, Scene, Texture,
+    Triangle,
 };
 use photoncard_tests::shapes::{add_tangents, add_textured_quad};
 use photoncard_tests::{camera, glass, lambertian, mean, quad, render_or_panic, room, scene, skip};
@@ -148,6 +149,22 @@ fn coats_and_bumps_of_plastic_leave_the_features_of_the_plastic() {
     let bumpy = film(&room_before_bumps(bumpy, view));
     for (film, least) in [(coated, 0.999), (bumpy, 0.93)] {
         assert!(film.pixels().all(|pixel| pixel.normal[2] > least && pixel.albedo[0] > 0.6));
+    }
+}
+
+/// A denoiser must not take what mirrors and glass show of the sky for the sky itself.
+#[test]
+fn the_sky_in_a_mirror_has_the_depth_of_the_mirror() {
+    let corner = |x: f32, y: f32| Vec3::new(x, y, -2.0);
+    let pane = quad([corner(-0.2, -0.2), corner(0.2, -0.2), corner(0.2, 0.2), corner(-0.2, 0.2)], 0);
+    for material in [mirror(1.0), glass("pane", Vec3::ONE, false)] {
+        let view = camera(Vec3::ZERO, Vec3::NEG_Z);
+        let mut scene = scene(pane.to_vec(), vec![material], view);
+        scene.environment = Some(Environment::constant(Vec3::ONE));
+        let film = film(&scene);
+        let [middle, corner] =
+            [film.pixel(12, 12), film.pixel(0, 0)].map(|pixel| pixel.expect("a pixel").depth);
+        assert!((middle - 2.0).abs() < 0.01 && corner == f32::INFINITY, "{middle} {corner}");
     }
 }
 

@@ -3,11 +3,15 @@
 use glam::Vec3;
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::{Finish, Fit, Quality};
+use photoncard_driver::quality::{Finish, Fit, Quality, Stated};
 use photoncard_driver::render::{RenderSettings, Unobserved};
 use photoncard_driver::scene::gltf;
-use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene};
-use photoncard_tests::{camera, lambertian, room, scene};
+use photoncard_driver::scene::{
+    Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, Triangle,
+};
+use photoncard_tests::{camera, lambertian, mean, quad, render_or_panic, room, scene};
+
+use super::specular::mirror;
 
 /// Settings of a small picture with the quality `good`.
 fn small() -> RenderSettings {
@@ -138,4 +142,59 @@ fn the_dissertations_values_depend_on_no_scene() {
     let fit = fit.expect("no pilot");
     assert_eq!(fit, None);
     assert_eq!(Quality::Paper.settings(), RenderSettings::default());
+}
+
+/// A grey floor before a mirror under an even sky of 1 W/(sr m^2), with more triangles of the third material.
+fn floor_before_a_mirror(more: &[Triangle], third: Material) -> Scene {
+    let floor = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+    let wall = [[-1.0, 0.0], [1.0, 0.0], [1.0, 1.5], [-1.0, 1.5]].map(|[x, y]| Vec3::new(x, y, -1.0));
+    let triangles = [&quad(floor, 0)[..], &quad(wall, 1), more].concat();
+    let view = camera(Vec3::new(0.0, 1.0, 1.0), Vec3::new(0.0, -0.8, -1.0));
+    let mut scene = scene(triangles, vec![lambertian("floor", 0.5), mirror(0.9), third], view);
+    scene.environment = Some(Environment::constant(Vec3::ONE));
+    scene
+}
+
+#[test]
+fn soft_caustics_have_no_map_and_equal_light() {
+    let scene = floor_before_a_mirror(&[], lambertian("none", 0.5));
+    let found = fit(&scene, &small());
+    assert_eq!(found.max_caustic_photons, 0, "{found:?}");
+    let mean_by = |caustic_photons| {
+        let settings = small().with(|s| {
+            found.apply(s, Stated::default());
+            s.photons.caustic_photons = Some(caustic_photons);
+        });
+        let film = render_or_panic(&scene, &settings).film;
+        mean(&film.pixels().map(|pixel| pixel.radiance).collect::<Vec<_>>())
+    };
+    let [without, with] = [0, 100_000].map(mean_by);
+    assert!((without / with - 1.0).abs() < 0.01, "{without} {with}");
+}
+
+#[test]
+fn caustics_of_suns_and_of_small_bright_lamps_have_a_map() {
+    let mut sunny = floor_before_a_mirror(&[], lambertian("none", 0.5));
+    let kind = PunctualKind::Directional { direction: Vec3::new(0.0, -1.0, -1.0).normalize() };
+    sunny.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(0.1) });
+    let lamp = Material { emission: Vec3::splat(500.0), ..lambertian("lamp", 0.0) };
+    let corners = [[0.0, 0.0], [0.01, 0.0], [0.01, 0.01], [0.0, 0.01]].map(|[x, z]| Vec3::new(x, 2.0, z));
+    let lit = floor_before_a_mirror(&quad(corners, 2), lamp);
+    for scene in [sunny, lit] {
+        assert_eq!(fit(&scene, &small()).max_caustic_photons, usize::MAX);
+    }
+}
+
+/// The floor is one-sided and lit from below: paths end on it and store no photon.
+#[test]
+fn a_scene_that_stores_no_photon_has_settings() {
+    let floor = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+    let view = camera(Vec3::new(0.0, 1.0, 1.0), Vec3::new(0.0, -0.8, -1.0));
+    let mut scene = scene(quad(floor, 0).to_vec(), vec![lambertian("floor", 0.5)], view);
+    let kind = PunctualKind::Directional { direction: Vec3::Y };
+    scene.lights.push(PunctualLight { name: "light".into(), kind, intensity: Vec3::ONE });
+    let found = fit(&scene, &small());
+    assert!(found.photons > 0, "{found:?}");
+    let settings = small().with(|settings| found.apply(settings, Stated::default()));
+    assert!(render_or_panic(&scene, &settings).film.pixels().all(|pixel| pixel.radiance == [0.0; 3]));
 }

@@ -26,6 +26,7 @@ use self::colour::mean;
 use self::emission::EmissiveTextures;
 pub(crate) use self::environment::EnvironmentMap;
 use self::shares::Shares;
+pub use self::sources::SourceRadiance;
 pub(crate) use self::sources::{Source, Sources};
 pub(crate) use self::targets::{Aim, SolidCone, Targets};
 use self::thresholds::thresholds;
@@ -194,7 +195,7 @@ impl SceneEmitter {
         (power > 0.0).then_some(Self { triangle: index, record, bounds, strongest })
     }
 
-    /// Radiance at the brightest texel, averaged over channels, W/(sr m^2); infinite without an area.
+    /// Radiance under a white texture, averaged over channels, W/(sr m^2); infinite without an area.
     fn radiance(&self) -> f64 {
         match self.record.kind {
             EmitterKind::Triangle { .. } => mean(Vec3::from(self.record.emission)),

@@ -55,10 +55,18 @@ pub(crate) struct Sources {
     /// is the probability of choosing the source. The unit of photon powers is derived from it. If a fraction
     /// of the photons is aimed, the other photons are stronger, and this maximum is greater.
     pub(crate) strongest: f32,
-    /// Mean radiance of the sources, weighted by their power, W/(sr m^2): the second moment of the radiance
-    /// that a ray finds at the sources, divided by the first. Infinite with lights without an area; 0 without
-    /// light.
-    pub(crate) radiance: f64,
+    pub(crate) radiance: SourceRadiance,
+}
+
+/// Radiance of sources, averaged over channels, W/(sr m^2). It is infinite with a light without an area, and 0
+/// without light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SourceRadiance {
+    /// Mean, weighted by power: the second moment of the radiance that a ray finds at the sources, divided by
+    /// the first.
+    pub mean: f64,
+    /// Maximum.
+    pub greatest: f64,
 }
 
 /// A source chosen by [`Sources::choose`].
@@ -136,7 +144,7 @@ impl Sources {
         Self {
             strongest: strongest.filter(|watts| watts.is_finite()).fold(0.0, f32::max),
             power: if is_aimed { 0.0 } else { all.powers.iter().sum() },
-            radiance: all.mean_radiance(),
+            radiance: all.radiance(),
             list: all.list,
             thresholds,
             bounds,
@@ -200,12 +208,16 @@ impl AllSources {
         self.radiances.push(radiance);
     }
 
-    /// Mean of the radiances, weighted by the powers; 0 without power.
-    fn mean_radiance(&self) -> f64 {
-        let lit = self.powers.iter().zip(&self.radiances).filter(|(power, _)| **power > 0.0);
-        let (sum, power) =
-            lit.fold((0.0, 0.0), |(sum, all), (power, radiance)| (sum + power * radiance, all + power));
-        if power > 0.0 { sum / power } else { 0.0 }
+    fn radiance(&self) -> SourceRadiance {
+        let [mut weighted, mut power, mut greatest] = [0.0_f64; 3];
+        for (of_source, radiance) in self.powers.iter().zip(&self.radiances) {
+            if *of_source > 0.0 {
+                weighted += of_source * radiance;
+                power += of_source;
+                greatest = greatest.max(*radiance);
+            }
+        }
+        SourceRadiance { mean: if power > 0.0 { weighted / power } else { 0.0 }, greatest }
     }
 
     /// Adds the cells of the environment. `shown(direction)` is the area, m^2, through which a cell's light
@@ -286,23 +298,24 @@ mod tests {
 
     #[test]
     fn the_mean_radiance_is_weighted_by_power_and_infinite_with_a_light_without_an_area() {
-        assert_eq!(lamp(SceneContents::default()).radiance, 3.0);
+        let alone = lamp(SceneContents::default()).radiance;
+        assert_eq!(alone, SourceRadiance { mean: 3.0, greatest: 3.0 });
         let light = PunctualLight {
             name: "dim".into(),
             kind: PunctualKind::Point { position: Vec3::ZERO },
             intensity: Vec3::splat(1e-3),
         };
-        assert_eq!(
-            lamp(SceneContents { lights: vec![light], ..SceneContents::default() }).radiance,
-            f64::INFINITY
-        );
-        let environment = Some(Environment::constant(Vec3::splat(1.0)));
+        let with_point = lamp(SceneContents { lights: vec![light], ..SceneContents::default() }).radiance;
+        assert_eq!([with_point.mean, with_point.greatest], [f64::INFINITY; 2]);
+        let environment = Some(Environment::constant(Vec3::ONE));
         let both = lamp(SceneContents { environment, ..SceneContents::default() });
         let of_lamp = 3.0 * 0.5 * std::f64::consts::PI / both.power;
-        assert!((both.radiance - (3.0 * of_lamp + 1.0 - of_lamp)).abs() < 1e-5, "{}", both.radiance);
-        assert!((0.1..0.9).contains(&of_lamp));
+        let SourceRadiance { mean, greatest } = both.radiance;
+        assert!((mean - (3.0 * of_lamp + 1.0 - of_lamp)).abs() < 1e-5, "{mean}");
+        assert!((0.1..0.9).contains(&of_lamp) && greatest == 3.0);
         let dark = Scene::default();
-        assert_eq!(Sources::new(&dark, &Lights::new(&dark), None).radiance, 0.0);
+        let none = Sources::new(&dark, &Lights::new(&dark), None).radiance;
+        assert_eq!([none.mean, none.greatest], [0.0; 2]);
     }
 
     #[test]

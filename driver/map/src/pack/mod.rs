@@ -32,6 +32,7 @@ use self::corners::PackedCorners;
 pub use self::error::PackError;
 use self::flat_glass::Glazing;
 pub(crate) use self::writer::ImageWriter;
+pub use crate::light::SourceRadiance;
 
 /// Memory that packing takes per triangle, bytes: mainly binary trees, without the scene itself.
 const BYTES_OF_A_TRIANGLE: u64 = 400;
@@ -131,14 +132,14 @@ impl PackedScene {
         self.caustic_sources.as_ref()
     }
 
-    /// Mean radiance of the lights whose caustics the scene can show, weighted by their power towards its
-    /// specular surfaces, W/(sr m^2). Infinite with point, spot and distant lights, which no gather ray can
-    /// hit; 0 without specular surfaces.
-    pub fn radiance_of_caustics(&self) -> f64 {
+    /// Radiance of the lights whose caustics the scene can show, weighted by their power towards its specular
+    /// surfaces. Infinite with point, spot and distant lights, which no gather ray can hit; `None` without
+    /// caustics.
+    pub fn radiance_of_caustics(&self) -> Option<SourceRadiance> {
         if self.has_lobes_under_punctual_lights {
-            return f64::INFINITY;
+            return Some(SourceRadiance { mean: f64::INFINITY, greatest: f64::INFINITY });
         }
-        self.caustic_sources.as_ref().map_or(0.0, |sources| sources.radiance)
+        self.caustic_sources.as_ref().map(|sources| sources.radiance)
     }
 
     /// Returns whether any surface stores photons.

@@ -177,10 +177,8 @@ const COST_OF_GATHER_RAY: f64 = 1.2;
 const COST_OF_PHOTON: f64 = 2.5;
 /// Cost of each further path that a photon takes, in the same unit.
 const COST_OF_PATH: f64 = 0.3;
-/// Maximum mean radiance of the lights whose caustics can be seen, divided by the median radiance of the
-/// picture, at which gather rays carry caustics and there is no caustic map. A gather ray that finds such a
-/// light at the end of a specular path changes its pixel by few times the pixel's radiance.
-const MAX_RADIANCE_OF_CAUSTICS: f64 = 16.0;
+/// Maximum number of paths by which the least numbers of photons are divided where a photon takes several.
+const MAX_PATHS_OF_PHOTON: f64 = 8.0;
 /// Minimum and maximum of the adaptive threshold, as multiples of the cost model's threshold.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
 /// Minimum of [`Variances::gather_rays_per_ray`] in the computation of costs. The measured value may be too
@@ -271,9 +269,11 @@ impl Fit {
     /// interpolated. Each sample then has the gather rays that the time allows, at least one.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
         let paths = self.measured.paths_of_photon;
-        let relative_cost = cost_of_photon(paths) / COST_OF_PHOTON;
-        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds / relative_cost;
+        let in_room = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
+        let most = in_room * COST_OF_PHOTON / cost_of_photon(paths);
         let most = rounded(most, &(by_paths(MIN_PHOTONS_IN_TIME, paths)..=MAX_PHOTONS));
+        // Caustic photons are aimed by themselves.
+        let most_caustic = rounded(in_room, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS)) / PHOTONS_OF_CAUSTIC_PHOTON;
         let photons = self.photons.min(most);
         let shadow_rays = if stated.shadow_rays { integrator.shadow_rays } else { self.shadow_rays };
         let cost_of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(shadow_rays);
@@ -289,7 +289,7 @@ impl Fit {
         let of_samples = of_sample.saturating_mul(self.samples);
         Self {
             photons,
-            max_caustic_photons: self.max_caustic_photons.min(most / PHOTONS_OF_CAUSTIC_PHOTON),
+            max_caustic_photons: self.max_caustic_photons.min(most_caustic),
             interpolates,
             gather_rays: if interpolates { of_record } else { self.gather_rays.min(of_samples) },
             beyond: Beyond {
@@ -313,7 +313,9 @@ impl Fit {
         if !stated.photons {
             photons.count = self.photons;
         }
-        if !stated.caustic_photons {
+        // Without gather rays the map alone has the light of caustics.
+        let has_rays = !stated.gather_rays || integrator.gather_rays > 0;
+        if !stated.caustic_photons && (has_rays || self.max_caustic_photons > 0) {
             let fewer = |count: usize| count.min(self.max_caustic_photons);
             photons.caustic_photons = photons.caustic_photons.map(fewer);
         }
@@ -375,7 +377,6 @@ impl Quality {
         let of = Pictured {
             pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
             triangles: scene.stored_triangles().count(),
-            radiance_of_caustics: packed.radiance_of_caustics(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
         let is_short = time_limit.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);
@@ -388,8 +389,6 @@ impl Quality {
 struct Pictured {
     pixels: f64,
     triangles: usize,
-    /// As [`PackedScene::radiance_of_caustics`].
-    radiance_of_caustics: f64,
     /// True if the irradiance cache may be used.
     is_cached: bool,
 }
@@ -407,6 +406,7 @@ impl Level {
             lambertian,
             gather_rays_per_ray,
             paths_of_photon,
+            has_soft_caustics,
             level,
             photon: of_scene,
             for_camera,
@@ -427,11 +427,10 @@ impl Level {
         let for_triangles = of.triangles.saturating_mul(PHOTONS_OF_TRIANGLE).min(MOST_FOR_TRIANGLES);
         let [fewest, most] = [*self.photons.start(), *self.photons.end()];
         let fewest = by_paths(fewest.max(for_triangles).min(most), paths_of_photon);
-        let is_dim = of.radiance_of_caustics <= MAX_RADIANCE_OF_CAUSTICS * level;
         Fit {
             samples,
             photons: rounded(photons, &(fewest..=most)),
-            max_caustic_photons: if is_dim { 0 } else { usize::MAX },
+            max_caustic_photons: if has_soft_caustics { 0 } else { usize::MAX },
             photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             beyond: Beyond {
@@ -464,10 +463,10 @@ fn cost_of_photon(paths: f64) -> f64 {
     COST_OF_PHOTON + COST_OF_PATH * (paths - 1.0).max(0.0)
 }
 
-/// Number of photons that are stored by as many paths as `photons` take in a room, where each path stores at
-/// least one.
+/// Number of photons that as many paths store as store `photons` in a room, where each path stores at least
+/// one; at least an eighth of `photons`.
 fn by_paths(photons: usize, paths_of_photon: f64) -> usize {
-    (photons as f64 / paths_of_photon.max(1.0)) as usize
+    (photons as f64 / paths_of_photon.clamp(1.0, MAX_PATHS_OF_PHOTON)) as usize
 }
 
 /// Rounds `number` up to a multiple of `step`, and clamps it to the bounds. Returns the maximum for NaN.
@@ -506,12 +505,12 @@ mod tests {
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
         paths_of_photon: 0.3,
+        has_soft_caustics: false,
         for_camera: None,
         level: 4.0,
         deviations: Deviations::NONE,
     };
-    const PICTURED: Pictured =
-        Pictured { pixels: 65_536.0, triangles: 32, radiance_of_caustics: f64::INFINITY, is_cached: true };
+    const PICTURED: Pictured = Pictured { pixels: 65_536.0, triangles: 32, is_cached: true };
 
     fn good(variances: &Variances) -> Fit {
         Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
@@ -584,7 +583,10 @@ mod tests {
     #[test]
     fn photons_that_take_many_paths_are_fewer() {
         let by = |photon, paths_of_photon| good(&Variances { photon, paths_of_photon, ..VARIANCES });
-        assert_eq!([0.5, 1.0, 10.0].map(|paths| by(0.0, paths).photons), [200_000, 200_000, 20_000]);
+        assert_eq!(
+            [0.5, 1.0, 5.0, 1e6].map(|paths| by(0.0, paths).photons),
+            [200_000, 200_000, 40_000, 25_000]
+        );
         let [in_room, of_object] = [1.0, 10.0].map(|paths| by(VARIANCES.photon, paths));
         assert!(in_room.photons > of_object.photons && of_object.photons > in_room.photons / 2);
         let [in_room, of_object] = [in_room, of_object].map(|fit| {
@@ -595,21 +597,25 @@ mod tests {
     }
 
     #[test]
-    fn caustics_of_dim_lights_need_no_map() {
-        let by = |radiance_of_caustics: f64, stated| {
-            let of = Pictured { radiance_of_caustics, ..PICTURED };
-            let fit = Quality::Good.level(Finish::Rendered).unwrap().fit(&VARIANCES, &of);
-            let settings = Quality::Good.settings().with(|settings| fit.apply(settings, stated));
+    fn soft_caustics_have_no_map_unless_it_is_stated_or_nothing_else_brings_them() {
+        let by = |has_soft_caustics, stated, gather_rays| {
+            let fit = good(&Variances { has_soft_caustics, ..VARIANCES });
+            let settings = Quality::Good.settings().with(|settings| {
+                settings.integrator.gather_rays = gather_rays;
+                fit.apply(settings, stated);
+            });
             settings.photons.caustic_photons
         };
-        let open = Stated::default();
-        let limit = MAX_RADIANCE_OF_CAUSTICS * VARIANCES.level;
-        let own = Quality::Good.settings().photons.caustic_photons;
-        assert_eq!(
-            [0.0, limit, 1.01 * limit, f64::INFINITY].map(|radiance| by(radiance, open)),
-            [Some(0), Some(0), own, own]
-        );
-        assert_eq!(by(0.0, Stated { caustic_photons: true, ..open }), own);
+        let (open, own) = (Stated::default(), Quality::Good.settings().photons.caustic_photons);
+        let rays_are_stated = Stated { gather_rays: true, ..open };
+        assert_eq!([by(true, open, 8), by(true, rays_are_stated, 8)], [Some(0); 2]);
+        for (has_soft_caustics, stated, gather_rays) in [
+            (false, open, 8),
+            (true, Stated { caustic_photons: true, ..open }, 8),
+            (true, rays_are_stated, 0),
+        ] {
+            assert_eq!(by(has_soft_caustics, stated, gather_rays), own);
+        }
     }
 
     #[test]

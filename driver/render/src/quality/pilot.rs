@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 use photoncard_firmware::sampler::hash;
-use photoncard_map::pack::PackedScene;
+use photoncard_map::pack::{PackedScene, SourceRadiance};
 use photoncard_map::photon;
 use photoncard_map::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
 use photoncard_picture::film::Window;
@@ -39,6 +39,10 @@ const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=MAX_USED_SHARE;
 const ERROR_BY_USED_SHARE: f64 = 2.0;
 /// Ratio of the numbers of photons of the pilot's larger and smaller map.
 const MORE: usize = 4;
+/// Maximum radiance of the lights that caustics come from, mean and greatest, divided by the median radiance
+/// of the visible surfaces, at which gather rays bring caustics and there is no caustic map. A gather ray that
+/// finds such a light at the end of a specular path changes its pixel by few times the pixel's radiance.
+const MAX_RADIANCE_OF_CAUSTICS: SourceRadiance = SourceRadiance { mean: 16.0, greatest: 128.0 };
 /// Number of photons whose paths are counted before the pilot.
 const PROBED_PHOTONS: usize = 1024;
 /// Maximum divisor of the pilot's numbers of photons, where a photon takes many paths.
@@ -100,6 +104,8 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Number of paths from the lights per stored photon.
     pub(super) paths_of_photon: f64,
+    /// True if gather rays bring caustics with little noise, so that a caustic map is not worth its time.
+    pub(super) has_soft_caustics: bool,
     /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
     /// Noise of the direct light of each pixel, measured from two pilot renders with equal settings, which
@@ -175,7 +181,12 @@ pub(super) fn measure(
         None => by_few_photons.share_seen(),
     };
     drop(few);
-    let more = pilot(settings, more_photons)?;
+    let mut more = pilot(settings, more_photons)?;
+    let has_soft_caustics = more.has_caustics && {
+        let pixels = more.render_pixels(&by_map.clone().with(|s| s.integrator.shadow_rays = 1), &tiles)?;
+        packed.radiance_of_caustics().is_some_and(|light| is_soft(light, level_of_surfaces(&pixels)))
+    };
+    more.has_caustics &= !has_soft_caustics;
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
         let render = |seed| {
             let settings = settings.clone().with(|settings| {
@@ -220,6 +231,7 @@ pub(super) fn measure(
         lambertian: best[0].lambertian,
         gather_rays_per_ray,
         paths_of_photon,
+        has_soft_caustics,
         level: level_of(&best),
         deviations: deviations(&best),
     })
@@ -262,6 +274,20 @@ fn level_of(best: &[Pixels; 2]) -> f64 {
     let [first, second] = best;
     Levels::new((0..first.direct.len()).map(|pixel| 0.5 * (first.radiance(pixel) + second.radiance(pixel))))
         .median()
+        .unwrap_or(1.0)
+}
+
+/// Median radiance of the lit pixels that see a surface, W/(sr m^2); `None` if there is none.
+fn level_of_surfaces(pixels: &Pixels) -> Option<f64> {
+    let seen = (0..pixels.direct.len()).filter(|&pixel| pixels.is_seen[pixel]);
+    Levels::new(seen.map(|pixel| pixels.radiance(pixel))).median()
+}
+
+/// Returns whether gather rays find lights of this radiance, by way of specular surfaces, with little noise.
+/// `level` is the median radiance of the surfaces that the picture shows.
+fn is_soft(light: SourceRadiance, level: Option<f64>) -> bool {
+    let SourceRadiance { mean, greatest } = MAX_RADIANCE_OF_CAUSTICS;
+    level.is_some_and(|level| light.mean <= mean * level && light.greatest <= greatest * level)
 }
 
 /// Deviations of direct light in the pixels of a pair of renders.
@@ -457,6 +483,14 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn caustics_are_soft_if_no_light_is_far_brighter_than_the_surfaces() {
+        let soft = |mean, greatest, level| is_soft(SourceRadiance { mean, greatest }, level);
+        assert!(soft(8.0, 8.0, Some(0.5)) && soft(8.0, 64.0, Some(0.5)));
+        assert!(!soft(8.1, 8.1, Some(0.5)) && !soft(8.0, 65.0, Some(0.5)));
+        assert!(!soft(f64::INFINITY, f64::INFINITY, Some(1.0)) && !soft(1.0, 1.0, None));
+    }
 
     #[test]
     fn an_estimate_gains_by_the_used_share_and_nothing_without_an_error() {

@@ -7,7 +7,7 @@ const LEFT_OUT: f64 = 0.02;
 /// median of the lit pixels, because noise in the dark is less visible.
 pub(super) struct Levels {
     levels: Vec<f64>,
-    median: f64,
+    median: Option<f64>,
 }
 
 impl Levels {
@@ -16,12 +16,13 @@ impl Levels {
         let radiances: Vec<f64> = radiances.into_iter().collect();
         let mut lit: Vec<f64> = radiances.iter().copied().filter(|radiance| *radiance > 0.0).collect();
         let middle = lit.len() / 2;
-        let median = if lit.is_empty() { 1.0 } else { *lit.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        Self { levels: radiances.into_iter().map(|radiance| radiance.max(median)).collect(), median }
+        let median = (!lit.is_empty()).then(|| *lit.select_nth_unstable_by(middle, f64::total_cmp).1);
+        let least = median.unwrap_or(1.0);
+        Self { levels: radiances.into_iter().map(|radiance| radiance.max(least)).collect(), median }
     }
 
-    /// Median radiance of the lit pixels; 1 for a black picture.
-    pub(super) fn median(&self) -> f64 {
+    /// Median radiance of the lit pixels; `None` for a black picture.
+    pub(super) fn median(&self) -> Option<f64> {
         self.median
     }
 
