@@ -73,8 +73,8 @@ impl Denoiser {
     /// Albedo and normals are denoised first, each alone, and then guide the denoising of the radiance.
     /// Because they have little noise, the library's smaller network (quality *balanced*) denoises them; this
     /// changes the picture's error by 2 % at most. Pixels around which no eye ray hits a surface keep their
-    /// radiance: the environment has no noise, and the network would change it. `threads` is the maximum number of threads; `None` for one
-    /// per core.
+    /// radiance: the environment has no noise, and the network would change it. `threads` is the maximum
+    /// number of threads; `None` for one per core.
     ///
     /// # Errors
     /// [`DenoiseError::Incomplete`], [`DenoiseError::Stopped`] soon after `must_stop` returns true, and

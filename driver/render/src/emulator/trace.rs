@@ -39,8 +39,8 @@ pub enum TraceFormat {
     Dinero,
     /// Lines read from and written to DRAM, for Ramulator 2's load-store trace.
     Ramulator,
-    /// Lines read from and written to DRAM, for `DRAMsim3`. Each access is one cycle after the previous one, so that the
-    /// DRAM always has work.
+    /// Lines read from and written to DRAM, for `DRAMsim3`. Each access is one cycle after the previous one,
+    /// so that the DRAM always has work.
     Dramsim3,
 }
 
