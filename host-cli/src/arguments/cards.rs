@@ -48,8 +48,8 @@ pub(crate) struct CardOptions {
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
-    /// Write every access to memory of an emulated chip to a file for a simulator of caches or of DRAM, compressed
-    /// by gzip; a large picture has billions of accesses: use --crop
+    /// Write every access to memory of an emulated chip to a file for a simulator of caches or of DRAM,
+    /// compressed by gzip; a large picture has billions of accesses: use --crop
     #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
     /// Accesses that the trace contains, and the trace's format

@@ -150,8 +150,8 @@ impl Target for Image {
     }
 }
 
-/// Loads a card image and renders two tiles of the frame of `choice`. Returns whether the card does it without
-/// a fault.
+/// Loads a card image and renders two tiles of the frame of `choice`. Returns whether the card does it
+/// without a fault.
 ///
 /// # Panics
 /// If the card answers with neither pixels nor a fault.

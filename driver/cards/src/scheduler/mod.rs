@@ -139,9 +139,9 @@ impl Scheduler {
         Self { has_helpers: true, ..self }
     }
 
-    /// With `deals_shares`, gives each card its share of the tiles at once, as far as it accepts them, instead
-    /// of a few at a time: a card whose gathers wait in card memory reads less the more tiles it has. The card
-    /// works on them together.
+    /// With `deals_shares`, gives each card its share of the tiles at once, as far as it accepts them,
+    /// instead of a few at a time: a card whose gathers wait in card memory reads less the more tiles it
+    /// has. The card works on them together.
     #[must_use]
     pub fn in_shares(self, deals_shares: bool) -> Self {
         Self { deals_shares, ..self }

@@ -58,8 +58,8 @@ pub(crate) struct Sources {
     pub(crate) radiance: SourceRadiance,
 }
 
-/// Radiance of sources, averaged over channels, W/(sr m^2). It is infinite with a light without an area, and 0
-/// without light.
+/// Radiance of sources, averaged over channels, W/(sr m^2). It is infinite with a light without an area, and
+/// 0 without light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SourceRadiance {
     /// Mean, weighted by power: the second moment of the radiance that a ray finds at the sources, divided by

@@ -40,8 +40,9 @@ const ERROR_BY_USED_SHARE: f64 = 2.0;
 /// Ratio of the numbers of photons of the pilot's larger and smaller map.
 const MORE: usize = 4;
 /// Maximum radiance of the lights that caustics come from, mean and greatest, divided by the median radiance
-/// of the visible surfaces, at which gather rays bring caustics and there is no caustic map. A gather ray that
-/// finds such a light at the end of a specular path changes its pixel by few times the pixel's radiance.
+/// of the visible surfaces, at which gather rays bring caustics and there is no caustic map. A gather ray
+/// that finds such a light at the end of a specular path changes its pixel by few times the pixel's
+/// radiance.
 const MAX_RADIANCE_OF_CAUSTICS: SourceRadiance = SourceRadiance { mean: 16.0, greatest: 128.0 };
 /// Number of photons whose paths are counted before the pilot.
 const PROBED_PHOTONS: usize = 1024;
