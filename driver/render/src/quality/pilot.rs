@@ -40,9 +40,8 @@ const ERROR_BY_USED_SHARE: f64 = 2.0;
 /// Ratio of the numbers of photons of the pilot's larger and smaller map.
 const MORE: usize = 4;
 /// Maximum radiance of the lights that caustics come from, mean and greatest, divided by the median radiance
-/// of the visible surfaces, at which gather rays bring caustics and there is no caustic map. A gather ray
-/// that finds such a light at the end of a specular path changes its pixel by few times the pixel's
-/// radiance.
+/// of the picture, at which gather rays bring caustics and there is no caustic map. A gather ray that finds
+/// such a light at the end of a specular path changes its pixel by few times the picture's radiance.
 const MAX_RADIANCE_OF_CAUSTICS: SourceRadiance = SourceRadiance { mean: 16.0, greatest: 128.0 };
 /// Number of photons whose paths are counted before the pilot.
 const PROBED_PHOTONS: usize = 1024;
@@ -185,7 +184,7 @@ pub(super) fn measure(
     let mut more = pilot(settings, more_photons)?;
     let has_soft_caustics = more.has_caustics && {
         let pixels = more.render_pixels(&by_map.clone().with(|s| s.integrator.shadow_rays = 1), &tiles)?;
-        packed.radiance_of_caustics().is_some_and(|light| is_soft(light, level_of_surfaces(&pixels)))
+        packed.radiance_of_caustics().is_some_and(|light| is_soft(light, pixels.level()))
     };
     more.has_caustics &= !has_soft_caustics;
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
@@ -278,14 +277,8 @@ fn level_of(best: &[Pixels; 2]) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// Median radiance of the lit pixels that see a surface, W/(sr m^2); `None` if there is none.
-fn level_of_surfaces(pixels: &Pixels) -> Option<f64> {
-    let seen = (0..pixels.direct.len()).filter(|&pixel| pixels.is_seen[pixel]);
-    Levels::new(seen.map(|pixel| pixels.radiance(pixel))).median()
-}
-
 /// Returns whether gather rays find lights of this radiance, by way of specular surfaces, with little noise.
-/// `level` is the median radiance of the surfaces that the picture shows.
+/// `level` is the median radiance of the picture's lit pixels, the background included.
 fn is_soft(light: SourceRadiance, level: Option<f64>) -> bool {
     let SourceRadiance { mean, greatest } = MAX_RADIANCE_OF_CAUSTICS;
     level.is_some_and(|level| light.mean <= mean * level && light.greatest <= greatest * level)
@@ -426,6 +419,11 @@ impl Pixels {
     fn share_seen(&self) -> f64 {
         let seen = self.is_seen.iter().filter(|is_seen| **is_seen).count();
         seen as f64 / self.is_seen.len().max(1) as f64
+    }
+
+    /// Median radiance of the lit pixels, W/(sr m^2); `None` if there is none.
+    fn level(&self) -> Option<f64> {
+        Levels::new((0..self.direct.len()).map(|pixel| self.radiance(pixel))).median()
     }
 
     fn radiance(&self, pixel: usize) -> f64 {
