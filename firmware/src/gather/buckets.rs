@@ -128,7 +128,7 @@ impl<B: Capacity> Buckets<B> {
     /// false if the bucket has no line.
     ///
     /// # Errors
-    /// Those of `take`, and [`FaultCode::LineRange`](photoncard_shared::message::FaultCode::LineRange).
+    /// Errors of `take`, and [`FaultCode::LineRange`](photoncard_shared::message::FaultCode::LineRange).
     pub fn read(
         &mut self,
         memory: &mut impl MemoryPort,
@@ -231,7 +231,7 @@ impl WrittenResults {
     /// Reads a line of results and removes it. `take` is called with each of them.
     ///
     /// # Errors
-    /// Those of `take`, and [`FaultCode::LineRange`](photoncard_shared::message::FaultCode::LineRange).
+    /// Errors of `take`, and [`FaultCode::LineRange`](photoncard_shared::message::FaultCode::LineRange).
     pub fn read(
         &mut self,
         memory: &mut impl MemoryPort,

@@ -245,7 +245,7 @@ mod tests {
     }
 
     fn restored(lines: &mut [Line], window: &Window) -> Result<Cache, Fault> {
-        // What the cache held before is of no consequence.
+        // Earlier contents of the cache have no effect.
         let mut cache = cache([7; 2], &[None; 3]);
         let mut memory = Dram::new(lines);
         cache.restore(window, &mut WordReader::new(&mut memory, Structure::Waiting, 1))?;

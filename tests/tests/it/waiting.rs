@@ -34,7 +34,7 @@ struct World {
     settings: RenderSettings,
 }
 
-/// What a chip has rendered: pixels in steps of sums, work, and traffic.
+/// Picture that a chip has rendered: pixels in steps of sums, work, and traffic.
 struct Picture {
     pixels: Vec<[i64; 3]>,
     work: Counters,

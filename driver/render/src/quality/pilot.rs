@@ -484,7 +484,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn caustics_are_soft_if_no_light_is_far_brighter_than_the_surfaces() {
+    fn caustics_are_soft_if_no_light_is_far_brighter_than_the_picture() {
         let soft = |mean, greatest, level| is_soft(SourceRadiance { mean, greatest }, level);
         assert!(soft(8.0, 8.0, Some(0.5)) && soft(8.0, 64.0, Some(0.5)));
         assert!(!soft(8.1, 8.1, Some(0.5)) && !soft(8.0, 65.0, Some(0.5)));
