@@ -70,21 +70,35 @@ pub const MAX_WAITING_BLOCKS: u32 = 64;
 /// [`Budget::waiting_blocks`].
 pub const MAX_WAITING_POINTS: u32 = 1 << 12;
 
-/// Number of waiting gathers in a line of card memory.
-pub const GATHERS_PER_LINE: usize = 5;
+/// Least number of waiting gathers in a full line of card memory.
+pub const LEAST_GATHERS_OF_LINE: usize = 5;
+/// Greatest number of waiting gathers in a line of card memory: of Lambertian surfaces.
+pub const MOST_GATHERS_OF_LINE: usize = 8;
 
 /// Maximum number of buckets of gathers in card memory.
-pub const MAX_BUCKETS: usize = 2048;
+pub const MAX_BUCKETS: usize = 256;
 
 /// Number of buckets of gathers in card memory: the greatest power of two, at most [`MAX_BUCKETS`], for which
 /// a queue of `queue` gathers has room for a line of each bucket; 0 if there is none.
 pub const fn gather_buckets(queue: u32) -> usize {
-    let lines = queue as usize / GATHERS_PER_LINE;
+    let lines = queue as usize / MOST_GATHERS_OF_LINE;
     if lines == 0 {
         return 0;
     }
     let buckets = 1 << lines.ilog2();
     if buckets < MAX_BUCKETS { buckets } else { MAX_BUCKETS }
+}
+
+/// Number of places of a queue of `queue` gathers that hold the lines of the buckets while rays are cast.
+pub const fn places_of_buckets(queue: u32) -> usize {
+    gather_buckets(queue) * MOST_GATHERS_OF_LINE
+}
+
+/// Number of places of a queue of `queue` gathers that hold gathers read from the buckets. A quarter of the
+/// queue reads hardly more of the photon map than the whole, and leaves memory for a larger cache.
+pub const fn places_of_gathering(queue: u32) -> usize {
+    let quarter = queue as usize / 4;
+    if quarter < MOST_GATHERS_OF_LINE { MOST_GATHERS_OF_LINE } else { quarter }
 }
 
 /// Upper limit of [`Budget::in_flight`] for all kinds of chips.

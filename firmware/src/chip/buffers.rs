@@ -14,14 +14,10 @@ pub(super) struct Shared<K: ChipKind> {
     /// Gather points of the tile whose rays are being cast.
     pub(super) points: Points<K::Points>,
     pub(super) sums: PixelSums<K::TilePixels>,
-    pub(super) gathers: SharedGathers<K>,
+    pub(super) gathers: Gathers<K::Candidates, K::GatherQueue, K::Buckets>,
     pub(super) rounds: Rounds<K::WaitingBlocks>,
     pub(super) store: RecordStore,
 }
-
-/// Gathers of a chip of kind `K`.
-pub(super) type SharedGathers<K> =
-    Gathers<<K as ChipKind>::Candidates, <K as ChipKind>::GatherQueue, <K as ChipKind>::Buckets>;
 
 impl<K: ChipKind> Shared<K> {
     pub(super) const fn new() -> Self {

@@ -66,6 +66,11 @@ impl<K: ChipKind> Vacant for Flight<K> {
 }
 
 impl<K: ChipKind> Flight<K> {
+    /// On-chip memory of the buffers for pixels and irradiance records, bytes.
+    pub(super) const BUFFER_BYTES: usize = size_of::<IrradianceCache<K::IrradianceRecords>>()
+        + size_of::<<K::TilePixels as Capacity>::Buffer<u16>>()
+        + size_of::<<K::TilePixels as Capacity>::Buffer<Paths>>();
+
     /// Sets the capacities for pixels and for irradiance records, if the types leave them open.
     pub(super) fn reserve(&mut self, pixels: usize, records: usize) {
         self.sums.reserve(pixels);

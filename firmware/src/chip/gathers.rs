@@ -1,7 +1,7 @@
 //! Photon gathers of a chip, done at once or queued for deferred reordering.
 
 use glam::Vec3;
-use photoncard_shared::budget::GATHERS_PER_LINE;
+use photoncard_shared::budget::{MOST_GATHERS_OF_LINE, places_of_gathering};
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant};
 
 use super::rounds::Rounds;
@@ -52,13 +52,8 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
         self.queue.is_draining()
     }
 
-    /// Number of queued gathers.
-    pub(super) fn len(&self) -> usize {
-        self.queue.len()
-    }
-
     /// Maximum number of gathers that wait in the queue.
-    pub(super) fn capacity(&self, frame: &FrameParameters) -> usize {
+    fn capacity(&self, frame: &FrameParameters) -> usize {
         (frame.queue as usize).clamp(1, self.queue.capacity())
     }
 
@@ -66,6 +61,12 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
     /// before another ray is cast.
     pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
         self.queue.len() >= self.capacity(frame)
+    }
+
+    /// Returns whether the queue has room for the gathers of another line of a bucket.
+    pub(super) fn has_room_for_line(&self, frame: &FrameParameters) -> bool {
+        let places = places_of_gathering(self.capacity(frame) as u32);
+        self.queue.len() + MOST_GATHERS_OF_LINE <= places
     }
 
     /// Number of buckets.
@@ -89,7 +90,7 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
         room: &mut Room,
         bucket: usize,
     ) -> Result<(), Fault> {
-        let lines = self.queue.places(self.buckets.len() * GATHERS_PER_LINE);
+        let lines = self.queue.places(self.buckets.len() * MOST_GATHERS_OF_LINE);
         self.buckets.write(memory, room, lines, bucket)
     }
 
@@ -118,7 +119,7 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
             let Some(room) = rounds.room_for_gather() else {
                 return self.gather(context, &request).map(Some);
             };
-            let lines = self.queue.places(self.buckets.len() * GATHERS_PER_LINE);
+            let lines = self.queue.places(self.buckets.len() * MOST_GATHERS_OF_LINE);
             context.memory.enter(Stage::Gather);
             self.buckets.add(context.memory, room, lines, request)?;
             context.memory.enter(Stage::GatherRay);

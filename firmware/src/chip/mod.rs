@@ -47,6 +47,8 @@ use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
 use self::flight::Flight;
 pub use self::light::{Component, PixelLight};
+use self::pixel_sums::PixelSums;
+use self::points::Points;
 use self::position::{Pass, Position};
 use self::rounds::Rounds;
 pub use self::rounds::least_waiting_lines;
@@ -56,7 +58,7 @@ use crate::irradiance_cache::IrradianceCache;
 use crate::kind::{
     self, Array, Capacity, ChipKind, FixedCapacity, FixedKind, Micro, Reference, TechniqueMemory,
 };
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Work};
 use crate::render::RenderJob;
 
 /// Chip with the budget [`REFERENCE`](crate::kind::REFERENCE).
@@ -110,6 +112,12 @@ impl<K: FixedKind> Chip<K> {
         irradiance_cache: K::Flights::ENTRIES * size_of::<IrradianceCache<K::IrradianceRecords>>(),
         importance_sampling: K::Points::ENTRIES * size_of::<DirectionTable>(),
     };
+
+    /// On-chip memory, bytes, of the buffers that are empty while gathers are done that have waited in card
+    /// memory ([`Work::Gathering`]).
+    pub const EMPTY_WHILE_GATHERING: usize = size_of::<Points<K::Points>>()
+        + size_of::<PixelSums<K::TilePixels>>()
+        + K::Flights::ENTRIES * Flight::<K>::BUFFER_BYTES;
 
     /// Creates a chip without tiles.
     pub const fn new() -> Self {
@@ -187,6 +195,9 @@ impl<K: ChipKind> Chip<K> {
         let Some(flight) = self.flights.values_mut().get_mut(number) else { return false };
         if is_alone {
             memory.begin_tile();
+            if frame.drain == Drain::Buckets {
+                memory.begin_work(Work::Casting);
+            }
         }
         flight.begin(tile);
         if frame.drain == Drain::Buckets {

@@ -9,15 +9,26 @@
 //!
 //! [`Drain::Buckets`]: photoncard_shared::message::Drain::Buckets
 
-use photoncard_shared::budget::GATHERS_PER_LINE;
+use photoncard_shared::budget::{LEAST_GATHERS_OF_LINE, MAX_BUCKETS, MOST_GATHERS_OF_LINE};
 use photoncard_shared::message::{Fault, Invariant};
 
 use super::chain;
-use super::request::{GatherRequest, GatherResult, REQUEST_BYTES, RESULT_BYTES};
+use super::request::{
+    GatherRequest, GatherResult, LAMBERTIAN_BYTES, LambertianRequest, OMITTED_BITS, REQUEST_BYTES,
+    RESULT_BYTES,
+};
 use crate::kind::{Buffer, Capacity, Vacant};
 use crate::memory::{MemoryPort, Room};
 
-const _: () = assert!(GATHERS_PER_LINE * REQUEST_BYTES == chain::RECORD_BYTES);
+const _: () = assert!(LEAST_GATHERS_OF_LINE * REQUEST_BYTES == chain::RECORD_BYTES);
+const _: () = assert!(MOST_GATHERS_OF_LINE * LAMBERTIAN_BYTES == chain::RECORD_BYTES);
+// The number of a bucket is the part of a position that a Lambertian request leaves out.
+const _: () = assert!(MAX_BUCKETS == 1 << OMITTED_BITS);
+
+/// Format of a line with up to [`LEAST_GATHERS_OF_LINE`] gathers, and of lines of results.
+const WHOLE: u8 = 0;
+/// Format of a line with more gathers, which have no lobes.
+const LAMBERTIAN: u8 = 1;
 /// Number of results in a line.
 pub const RESULTS_PER_LINE: usize = chain::RECORD_BYTES / RESULT_BYTES;
 
@@ -31,8 +42,8 @@ pub struct Buckets<B: Capacity> {
 #[derive(Clone, Copy)]
 struct Bucket(u32);
 
-const HELD_BITS: u32 = 3;
-const _: () = assert!(GATHERS_PER_LINE < 1 << HELD_BITS);
+const HELD_BITS: u32 = 4;
+const _: () = assert!(MOST_GATHERS_OF_LINE < 1 << HELD_BITS);
 /// Upper limit of the addresses of lines of buckets.
 pub const MAX_BUCKET_LINE: u32 = 1 << (u32::BITS - HELD_BITS);
 
@@ -99,12 +110,25 @@ impl<B: Capacity> Buckets<B> {
         request: GatherRequest,
     ) -> Result<(), Fault> {
         let number = request.position.part(self.len().checked_ilog2().unwrap_or(0));
+        let has_short_lines = self.len() == MAX_BUCKETS;
         let broken = Invariant::Room.fault();
         let bucket = self.buckets.values_mut().get_mut(number).ok_or(broken)?;
         let line = line_of(held, number).ok_or(broken)?;
-        *line.get_mut(bucket.held()).ok_or(broken)? = request;
+        let is_short = |gathers: &[GatherRequest]| {
+            has_short_lines && gathers.iter().all(|gather| LambertianRequest::new(gather).is_some())
+        };
+        // More gathers than a line of any holds are all Lambertian.
+        if bucket.held() >= LEAST_GATHERS_OF_LINE && !is_short(&[request]) {
+            bucket.write(memory, room, line)?;
+        }
+        let count = bucket.held();
+        *line.get_mut(count).ok_or(broken)? = request;
         *bucket = Bucket(bucket.0 + 1);
-        if bucket.held() == GATHERS_PER_LINE { bucket.write(memory, room, line) } else { Ok(()) }
+        let is_full = match bucket.held() {
+            LEAST_GATHERS_OF_LINE => !is_short(line.split_at(LEAST_GATHERS_OF_LINE).0),
+            count => count == MOST_GATHERS_OF_LINE,
+        };
+        if is_full { bucket.write(memory, room, line) } else { Ok(()) }
     }
 
     /// Writes the incomplete line of bucket `number`, if it has gathers.
@@ -124,8 +148,8 @@ impl<B: Capacity> Buckets<B> {
         }
     }
 
-    /// Reads a line of bucket `number` and removes it. `take` is called with each of its gathers. Returns
-    /// false if the bucket has no line.
+    /// Reads a line of bucket `number` and removes it. `take` is called with each of its gathers, at most
+    /// [`MOST_GATHERS_OF_LINE`]. Returns false if the bucket has no line.
     ///
     /// # Errors
     /// Errors of `take`, and [`FaultCode::LineRange`](photoncard_shared::message::FaultCode::LineRange).
@@ -140,27 +164,38 @@ impl<B: Capacity> Buckets<B> {
         if newest == chain::NONE {
             return Ok(false);
         }
-        chain::read(memory, &mut newest, |bytes| take(GatherRequest::from_bytes(bytes)))?;
+        let line = chain::read(memory, &mut newest)?;
+        if line.format == LAMBERTIAN {
+            line.each(|bytes| take(LambertianRequest(*bytes).request(number as u8)))?;
+        } else {
+            line.each(|bytes| take(GatherRequest::from_bytes(bytes)))?;
+        }
         *bucket = Bucket::new(newest, 0);
         Ok(true)
     }
 }
 
 /// Line of bucket `number` in the queue.
-fn line_of(held: &mut [GatherRequest], number: usize) -> Option<&mut [GatherRequest; GATHERS_PER_LINE]> {
+fn line_of(held: &mut [GatherRequest], number: usize) -> Option<&mut [GatherRequest; MOST_GATHERS_OF_LINE]> {
     held.as_chunks_mut().0.get_mut(number)
 }
 
 impl Bucket {
+    /// Writes the gathers in `line`. More than [`LEAST_GATHERS_OF_LINE`] are Lambertian.
     fn write(
         &mut self,
         memory: &mut impl MemoryPort,
         room: &mut Room,
-        line: &[GatherRequest; GATHERS_PER_LINE],
+        line: &[GatherRequest; MOST_GATHERS_OF_LINE],
     ) -> Result<(), Fault> {
-        let records = line.iter().take(self.held()).map(GatherRequest::to_bytes);
+        let gathers = line.iter().take(self.held());
         let mut newest = self.newest();
-        chain::append(memory, room, &mut newest, records)?;
+        if self.held() > LEAST_GATHERS_OF_LINE {
+            let short = gathers.filter_map(LambertianRequest::new).map(|LambertianRequest(bytes)| bytes);
+            chain::append(memory, room, &mut newest, LAMBERTIAN, short)?;
+        } else {
+            chain::append(memory, room, &mut newest, WHOLE, gathers.map(GatherRequest::to_bytes))?;
+        }
         *self = Self::new(newest, 0);
         Ok(())
     }
@@ -201,7 +236,7 @@ impl Results {
     pub fn write(&mut self, memory: &mut impl MemoryPort, room: &mut Room) -> Result<(), Fault> {
         if self.held > 0 {
             let records = self.line.iter().take(self.held as usize).map(GatherResult::to_bytes);
-            chain::append(memory, room, &mut self.newest, records)?;
+            chain::append(memory, room, &mut self.newest, WHOLE, records)?;
             self.held = 0;
         }
         Ok(())
@@ -237,6 +272,92 @@ impl WrittenResults {
         memory: &mut impl MemoryPort,
         mut take: impl FnMut(GatherResult) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        chain::read(memory, &mut self.0, |bytes| take(GatherResult::from_bytes(bytes)))
+        chain::read(memory, &mut self.0)?.each(|bytes| take(GatherResult::from_bytes(bytes)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use photoncard_shared::address::Line;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::gather::{GatherTarget, HilbertCode};
+    use crate::kind::Entries;
+    use crate::memory::Dram;
+    use crate::scene::PartialReflection;
+
+    /// Gathers of random positions, of which each has a lobe or none.
+    fn gathers() -> impl Strategy<Value = Vec<GatherRequest>> {
+        let few_buckets = (any::<u64>(), 0..4_u64).prop_map(|(bits, part)| bits >> 8 | (part * 85) << 56);
+        let gather = (few_buckets, any::<[u8; 13]>(), any::<[u8; 3]>(), prop::bool::weighted(0.2));
+        let gather = gather.prop_map(|(position, [a, b, c, d, rest @ ..], target, has_lobe)| {
+            let lobe = if has_lobe { rest } else { [0, 0, 0, 0, 0, 0, 0, 0, rest[8]] };
+            let [e, f, g, h, i, j, k, l, m] = lobe;
+            GatherRequest {
+                position: HilbertCode::of_bits(position),
+                reflection: PartialReflection::from_bytes(&[a, b, c, d, e, f, g, h, i, j, k, l, m]),
+                target: GatherTarget::from_bytes(target),
+            }
+        });
+        prop::collection::vec(gather, 0..120)
+    }
+
+    /// Writes gathers into `BUCKETS` buckets. Returns what each bucket holds, and the number of its lines.
+    fn written<const BUCKETS: usize>(gathers: &[GatherRequest]) -> Vec<(Vec<GatherRequest>, usize)> {
+        let mut lines = vec![Line::ZERO; 2 + gathers.len()];
+        let (mut memory, mut room) = (Dram::new(&mut lines), Room::new(1, 1 + gathers.len() as u32));
+        let mut buckets = Buckets::<Entries<BUCKETS>>::new();
+        buckets.clear();
+        let mut held = vec![GatherRequest::NONE; BUCKETS * MOST_GATHERS_OF_LINE];
+        for gather in gathers {
+            buckets.add(&mut memory, &mut room, &mut held, *gather).unwrap();
+        }
+        let bucket = |number| {
+            buckets.write(&mut memory, &mut room, &mut held, number).unwrap();
+            let (mut found, mut lines) = (Vec::new(), 0);
+            let mut take = |gather| {
+                found.push(gather);
+                Ok(())
+            };
+            while buckets.read(&mut memory, number, &mut take).unwrap() {
+                lines += 1;
+            }
+            (found, lines)
+        };
+        (0..BUCKETS).map(bucket).collect()
+    }
+
+    fn sorted(gathers: impl Iterator<Item = GatherRequest>) -> Vec<[u8; REQUEST_BYTES]> {
+        let mut bytes: Vec<_> = gathers.map(|gather| gather.to_bytes()).collect();
+        bytes.sort_unstable();
+        bytes
+    }
+
+    fn check<const BUCKETS: usize>(gathers: &[GatherRequest]) -> Result<(), TestCaseError> {
+        for (number, (found, lines)) in written::<BUCKETS>(gathers).into_iter().enumerate() {
+            let bits = BUCKETS.ilog2();
+            let of_bucket = gathers.iter().filter(|gather| gather.position.part(bits) == number);
+            prop_assert_eq!(sorted(found.iter().copied()), sorted(of_bucket.copied()));
+            let is_short = |gather| LambertianRequest::new(gather).is_some();
+            let most = found.len().div_ceil(LEAST_GATHERS_OF_LINE);
+            prop_assert!(lines <= most, "{} lines of {} gathers", lines, found.len());
+            if BUCKETS == MAX_BUCKETS && found.iter().all(is_short) {
+                prop_assert_eq!(lines, found.len().div_ceil(MOST_GATHERS_OF_LINE));
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        /// Lambertian gathers, in the greatest number of buckets, take an eighth of a line, others a fifth.
+        #[test]
+        fn buckets_return_their_gathers_and_take_few_lines(gathers in gathers()) {
+            check::<MAX_BUCKETS>(&gathers)?;
+            check::<4>(&gathers)?;
+        }
     }
 }

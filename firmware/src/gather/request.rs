@@ -51,6 +51,38 @@ impl GatherRequest {
     }
 }
 
+/// Length of an encoded request of a Lambertian surface, bytes.
+pub(super) const LAMBERTIAN_BYTES: usize = 15;
+
+/// Number of upper bits of a position that a [`LambertianRequest`] leaves out.
+pub(super) const OMITTED_BITS: u32 = 8;
+
+/// Request whose reflection has no lobe, without the upper bits of its position: 15 bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LambertianRequest(pub(super) [u8; LAMBERTIAN_BYTES]);
+
+impl LambertianRequest {
+    /// Encodes a request; `None` if its reflection has a lobe.
+    pub(super) fn new(request: &GatherRequest) -> Option<Self> {
+        let [position @ .., _] = request.position.bits().to_le_bytes();
+        let reflection = request.reflection.to_lambertian_bytes()?;
+        let mut bytes = [0; LAMBERTIAN_BYTES];
+        let parts = position.into_iter().chain(reflection).chain(request.target.to_bytes());
+        bytes.iter_mut().zip(parts).for_each(|(byte, part)| *byte = part);
+        Some(Self(bytes))
+    }
+
+    /// Request whose position has the upper bits `part`.
+    pub(super) fn request(&self, part: u8) -> GatherRequest {
+        let [a, b, c, d, e, f, g, reflection @ .., h, i, j] = self.0;
+        GatherRequest {
+            position: HilbertCode::of_bits(u64::from_le_bytes([a, b, c, d, e, f, g, part])),
+            reflection: PartialReflection::from_lambertian_bytes(reflection),
+            target: GatherTarget::from_bytes([h, i, j]),
+        }
+    }
+}
+
 /// Radiance that a gather has brought, and the sum to which it is added; 15 bytes in card memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherResult {
@@ -241,6 +273,15 @@ mod tests {
             let reflection = PartialReflection::from_bytes(&reflection);
             let request = GatherRequest { position, reflection, target };
             prop_assert_eq!(GatherRequest::from_bytes(&request.to_bytes()), request);
+            let part = position.part(OMITTED_BITS) as u8;
+            if let Some(short) = LambertianRequest::new(&request) {
+                prop_assert_eq!(short.request(part), request);
+            }
+            let [a, b, c, d, .., normal] = request.reflection.to_bytes();
+            let reflection = PartialReflection::from_lambertian_bytes([a, b, c, d, normal]);
+            let lambertian = GatherRequest { reflection, ..request };
+            let short = LambertianRequest::new(&lambertian).map(|short| short.request(part));
+            prop_assert_eq!(short, Some(lambertian));
             let result = GatherResult { target, brought: Vec3::from_array(brought) };
             prop_assert_eq!(GatherResult::from_bytes(&result.to_bytes()), result);
         }

@@ -5,7 +5,7 @@ use core::ops::Range;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-use super::{CardMemory, MemoryPort, Stage, Traffic};
+use super::{CardMemory, MemoryPort, Stage, Traffic, Work};
 
 /// Memory port that counts the traffic to the memory it wraps. Between chip and cache it counts the chip's
 /// requests. Between cache and DRAM it counts the cache's misses and the reads that fill its lines.
@@ -68,6 +68,10 @@ impl<M: MemoryPort> MemoryPort for Counted<M> {
 
     fn begin_tile(&mut self) {
         self.memory.begin_tile();
+    }
+
+    fn begin_work(&mut self, work: Work) {
+        self.memory.begin_work(work);
     }
 }
 

@@ -11,7 +11,7 @@ use core::ops::Range;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-use super::{CardMemory, MemoryPort, Stage, outside};
+use super::{CardMemory, MemoryPort, Stage, Work, outside};
 use crate::sampler::hash;
 
 /// Mapping from the index of a block to its set in the cache. A block is a part of card memory as long as a
@@ -255,22 +255,44 @@ fn fill(
 
 /// A memory behind caches: one for the photon maps and one for the scene, or one for both. A tile that begins
 /// while no other is in flight finds empty caches, so that its misses do not depend on earlier tiles.
+///
+/// While gathers wait in card memory, a cache for everything may take their place: a larger one for each kind
+/// of [`Work`], in the memory that the work leaves free. All caches are empty when another work begins.
 pub struct LineCaches<M, E, L> {
     memory: M,
     /// Cache of the photon maps; of everything if there is no cache of the scene.
     first: LineCache<E, L>,
     scene: Option<LineCache<E, L>>,
+    by_work: Option<CachesByWork<E, L>>,
+    work: Option<Work>,
+}
+
+struct CachesByWork<E, L> {
+    casting: LineCache<E, L>,
+    gathering: LineCache<E, L>,
 }
 
 impl<M, E, L> LineCaches<M, E, L> {
     /// Memory behind one cache for the photon maps and one for the scene.
     pub const fn new(memory: M, photon_map: LineCache<E, L>, scene: LineCache<E, L>) -> Self {
-        Self { memory, first: photon_map, scene: Some(scene) }
+        Self { memory, first: photon_map, scene: Some(scene), by_work: None, work: None }
     }
 
     /// Memory behind one cache for everything.
     pub const fn unified(memory: M, cache: LineCache<E, L>) -> Self {
-        Self { memory, first: cache, scene: None }
+        Self { memory, first: cache, scene: None, by_work: None, work: None }
+    }
+
+    /// Adds the caches for everything of a chip whose gathers wait in card memory: while it casts rays, and
+    /// while it does gathers.
+    #[must_use]
+    pub fn with_work(self, casting: LineCache<E, L>, gathering: LineCache<E, L>) -> Self {
+        Self { by_work: Some(CachesByWork { casting, gathering }), ..self }
+    }
+
+    fn caches(&mut self) -> impl Iterator<Item = &mut LineCache<E, L>> {
+        let by_work = self.by_work.iter_mut().flat_map(|caches| [&mut caches.casting, &mut caches.gathering]);
+        [&mut self.first].into_iter().chain(&mut self.scene).chain(by_work)
     }
 
     /// Memory behind the caches.
@@ -296,8 +318,10 @@ where
             self.memory.missed(structure);
             return self.memory.read(structure, address, 0..LINE_BYTES as u32);
         }
-        let cache = match &mut self.scene {
-            Some(scene) if !structure.is_photon_map() => scene,
+        let cache = match (&mut self.by_work, self.work, &mut self.scene) {
+            (Some(caches), Some(Work::Casting), _) => &mut caches.casting,
+            (Some(caches), Some(Work::Gathering), _) => &mut caches.gathering,
+            (_, _, Some(scene)) if !structure.is_photon_map() => scene,
             _ => &mut self.first,
         };
         cache.read(&mut self.memory, structure, address)
@@ -306,10 +330,7 @@ where
     fn write(&mut self, structure: Structure, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         self.memory.write(structure, first, lines)?;
         let written = first.0..first.0.saturating_add(lines.len() as u32);
-        self.first.forget(&written);
-        if let Some(scene) = &mut self.scene {
-            scene.forget(&written);
-        }
+        self.caches().for_each(|cache| cache.forget(&written));
         Some(())
     }
 
@@ -319,11 +340,15 @@ where
     }
 
     fn begin_tile(&mut self) {
-        self.first.clear();
-        if let Some(scene) = &mut self.scene {
-            scene.clear();
-        }
+        self.work = None;
+        self.caches().for_each(LineCache::clear);
         self.memory.begin_tile();
+    }
+
+    fn begin_work(&mut self, work: Work) {
+        self.work = Some(work);
+        self.caches().for_each(LineCache::clear);
+        self.memory.begin_work(work);
     }
 }
 

@@ -21,6 +21,27 @@ use photoncard_shared::message::{Fault, FaultCode};
 pub use traffic::{Reads, Traffic};
 pub use words::{Room, WORDS, WordReader, WordWriter, line_of, words_of};
 
+/// Kinds of work of a chip whose gathers wait in card memory
+/// ([`Drain::Buckets`](photoncard_shared::message::Drain::Buckets)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Rays are cast, and pixels completed. Of the gather queue, only the lines of the buckets are in use.
+    Casting,
+    /// Gathers are done. Buffers of gather points, pixels and irradiance records are empty, and no ray reads
+    /// the scene.
+    Gathering,
+}
+
+impl Work {
+    /// Name in traces and in the text of caches.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Casting => "casting",
+            Self::Gathering => "gathering",
+        }
+    }
+}
+
 /// Access of a chip to card memory. Caches and counters are `MemoryPort`s that wrap another `MemoryPort`.
 pub trait MemoryPort {
     /// Reads a line that belongs to `structure`. The chip uses the bytes in `used`.
@@ -51,6 +72,10 @@ pub trait MemoryPort {
     /// Sets the stage under which the following reads are counted.
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}
+
+    /// Begins another kind of work of a frame whose gathers wait in card memory, until [`Self::begin_tile`].
+    /// The memory of buffers that it leaves empty is free for caches, which are cleared.
+    fn begin_work(&mut self, _: Work) {}
 
     /// Notifies the port that its last reads filled one line of the cache that wraps it.
     #[inline(always)]

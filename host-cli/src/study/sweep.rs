@@ -98,7 +98,7 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
 /// Notice about caches that are larger than the on-chip memory of `chip`.
 fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     let sizes = match caches {
-        CacheSettings::Split { photon, scene } => [photon.bytes, scene.bytes],
+        CacheSettings::Split { photon, scene, .. } => [photon.bytes, scene.bytes],
         CacheSettings::Unified(both) => [both.bytes, 0],
     };
     let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.budget().sram_bytes));

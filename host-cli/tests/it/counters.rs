@@ -121,14 +121,14 @@ fn the_figures_of_the_document_on_memory_are_of_this_program() {
 }
 
 #[test]
-fn a_trace_has_a_line_for_every_request_and_every_tile() {
+fn a_trace_has_a_line_for_every_request_and_every_emptied_cache() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     room.rendered("scene.gltf", &["-o", "plain.exr", "--tile", "4"]);
     for (card, layout, order, begun) in [
         ("emulated:1", "jensen", "sort", 4..5),
         ("emulated-micro:1", "lines", "sort", 4..5),
-        ("emulated:1", "lines", "buckets", 1..5),
+        ("emulated:1", "lines", "buckets", 2..20),
     ] {
         let files = ["-o", "a.exr", "--stats", "a.json", "--trace", "a.din.gz"];
         let options = ["--card", card, "--photon-map", layout, "--tile", "4", "--order", order, "--quiet"];
@@ -140,12 +140,12 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
         let text = io::read_to_string(GzDecoder::new(&*room.read("a.din.gz"))).unwrap();
         assert!(text.starts_with("4 0\n") && text.ends_with('\n'));
         let image_bytes = statistics["image_bytes"].as_u64().unwrap();
-        let [mut requests, mut waiting, mut written, mut tiles] = [0_u64; 4];
+        let [mut requests, mut waiting, mut written, mut emptied] = [0_u64; 4];
         for line in text.lines() {
             let (label, address) = line.split_once(' ').unwrap();
             let is_of_image = u64::from_str_radix(address, 16).unwrap() < image_bytes;
             match (label, is_of_image) {
-                ("4", _) if address == "0" => tiles += 1,
+                ("4", _) if address == "0" => emptied += 1,
                 ("0", true) => requests += 1,
                 ("0", false) => waiting += 1,
                 ("1", false) => written += 1,
@@ -154,10 +154,61 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
         }
         let counted = ["photon_map", "scene"].map(|half| count(&statistics, half, "requests"));
         assert_eq!(requests, counted[0] + counted[1]);
-        assert!(begun.contains(&tiles), "{tiles}");
+        assert!(begun.contains(&emptied), "{emptied}");
         assert_eq!(waiting, count(&statistics, "waiting", "requests"));
         assert_eq!(waiting, written, "each line that waits is read once");
         assert_eq!(statistics["memory"]["tile_written_bytes"], 128 * written);
+    }
+}
+
+/// Number of misses in a labelled trace of a frame whose gathers wait in card memory, by an LRU cache of four
+/// ways with `sets` sets for each kind of work, casting and gathering.
+fn misses_by_work(text: &str, sets: [u64; 2]) -> u64 {
+    let mut cache: Vec<Vec<u64>> = Vec::new();
+    let mut misses = 0;
+    for line in text.lines() {
+        let words: Vec<_> = line.split(' ').collect();
+        match words[..] {
+            ["4", "0"] | ["1", ..] | ["0", _, "waiting", ..] => {}
+            ["4", "0", "casting"] => cache = vec![Vec::new(); sets[0] as usize],
+            ["4", "0", "gathering"] => cache = vec![Vec::new(); sets[1] as usize],
+            ["0", address, ..] => {
+                let line = u64::from_str_radix(address, 16).unwrap() / 128;
+                let place = (line % cache.len() as u64) as usize;
+                let set = &mut cache[place];
+                misses += u64::from(!set.contains(&line));
+                set.retain(|held| *held != line);
+                set.push(line);
+                if set.len() > 4 {
+                    set.remove(0);
+                }
+            }
+            _ => panic!("{line}"),
+        }
+    }
+    misses
+}
+
+#[test]
+fn a_simulator_of_a_labelled_trace_counts_the_bytes_of_each_kind_of_work() {
+    let room = Room::new();
+    let spheres = shipped("cornell-spheres.glb");
+    for (cache, sets) in [
+        ("casting=32K/128/4,gathering=8K/128/4", [64, 16]),
+        ("casting=2K/128/4,gathering=64K/128/4", [4, 128]),
+    ] {
+        let files = ["-o", "a.exr", "--stats", "a.json", "--trace", "a.din.gz", "--trace-labels"];
+        let options = ["--card", "emulated:1", "--order", "buckets", "--cache", cache, "--size", "24x24"];
+        room.rendered(
+            &spheres,
+            &[&files[..], &options, &["--quality", "paper", "--photons", "20000"]].concat(),
+        );
+        let statistics = statistics(&room, "a.json");
+        let text = io::read_to_string(GzDecoder::new(&*room.read("a.din.gz"))).unwrap();
+        let fetched: u64 =
+            ["photon_map", "scene"].map(|half| count(&statistics, half, "dram_bytes")).iter().sum();
+        assert_eq!(128 * misses_by_work(&text, sets), fetched, "{cache}");
+        assert!(text.contains("4 0 gathering"));
     }
 }
 
@@ -266,7 +317,7 @@ fn invalid_caches_are_refused_with_the_valid_form() {
         ("128K", "such as photon=128K/128/4"),
         ("photon=128K/64/4", "128 bytes"),
         ("photon=128K/128/3", "whole number of sets"),
-        ("unified=128K/128/4,scene=1K/128/1", "give unified, or photon and scene"),
+        ("unified=128K/128/4,scene=1K/128/1", "give unified, or the others"),
         ("unified=128K/128/4,index=best", "use modulo or hash"),
     ] {
         let outcome = room.render("scene.gltf", &["-o", "a.exr", "--cache", cache]);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use photoncard_firmware::memory::{
-    CacheEntry, CacheShape, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
+    CacheEntry, CacheShape, Counted, Dram, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage, Work,
 };
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
@@ -78,6 +78,42 @@ proptest! {
             let reads = memory.below().traffic().reads(Stage::Begin, Structure::Photons);
             prop_assert_eq!([reads.misses, reads.requests], [misses, fetched], "access {} of {}", access, address);
             prop_assert_eq!(reads.bytes, fetched * LINE_BYTES as u64);
+        }
+    }
+
+    /// Each kind of work has a cache of its own for all structures, which is empty when the work begins.
+    #[test]
+    fn a_kind_of_work_has_its_own_empty_cache(
+        sizes in prop::array::uniform4(1_u32..20),
+        parts in prop::collection::vec((0_usize..3, addresses(60)), 1..12),
+    ) {
+        let content = numbered(60);
+        let [photon, scene, casting, gathering] = sizes;
+        let of = |ways: u32| cache(CacheShape::new(ways * 128, 128, ways, SetIndex::Modulo).unwrap());
+        let oracle = |ways| LruOracle::new(1, ways, 1, |_| 0);
+        let memory = LineCaches::new(Counted::new(Lines(&content)), of(photon), of(scene));
+        let mut memory = memory.with_work(of(casting), of(gathering));
+        let mut misses = 0;
+        for (kind, addresses) in parts {
+            let mut oracles = match kind {
+                0 => vec![oracle(photon), oracle(scene)],
+                1 => vec![oracle(casting)],
+                _ => vec![oracle(gathering)],
+            };
+            match kind {
+                0 => memory.begin_tile(),
+                1 => memory.begin_work(Work::Casting),
+                _ => memory.begin_work(Work::Gathering),
+            }
+            for address in addresses {
+                let half = address as usize % 2;
+                let structure = [Structure::Photons, Structure::Nodes][half];
+                let place = half % oracles.len();
+                misses += u64::from(!oracles[place].hits(address));
+                let read = *memory.read(structure, LineAddress(address), 0..128).unwrap();
+                prop_assert_eq!(read, content[address as usize]);
+                prop_assert_eq!(memory.below().traffic().sum(|_, _| true).requests, misses);
+            }
         }
     }
 

@@ -8,13 +8,15 @@ use std::path::Path;
 
 use photoncard_firmware::card::{Card, MAX_TILES};
 use photoncard_firmware::chip::Chip;
+use photoncard_firmware::gather::REQUEST_BYTES;
 use photoncard_firmware::kind::{
     ChipKind, Entries, FixedKind, MIN_RECORDS, REFERENCE, Reference, TechniqueMemory, cache_bytes,
 };
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::{
     Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS,
-    MAX_WAITING_POINTS, SUMS_WITH_LAYERS, gather_buckets, gather_candidates,
+    MAX_WAITING_POINTS, SUMS_WITH_LAYERS, gather_buckets, gather_candidates, places_of_buckets,
+    places_of_gathering,
 };
 use serde_json::{Value, json};
 
@@ -160,7 +162,7 @@ impl Emulated {
             return contradictory("waiting_blocks", waiting_blocks, &rule);
         }
         if waiting_blocks > 0 && self.buckets() == 0 {
-            let rule = "0, or a gather_queue of 5 gathers or more";
+            let rule = "0, or a gather_queue of 8 gathers or more";
             return contradictory("waiting_blocks", waiting_blocks, rule);
         }
         if self.points < irradiance_records as usize {
@@ -192,15 +194,25 @@ impl Emulated {
 
     /// On-chip memory, bytes, that reordering, irradiance cache and importance sampling each add.
     pub fn techniques(&self) -> TechniqueMemory {
-        let [_, reordering, irradiance_cache, importance_sampling] = self.sizes();
+        let [_, reordering, irradiance_cache, importance_sampling, _] = self.sizes();
         TechniqueMemory { reordering, irradiance_cache, importance_sampling }
     }
 
-    /// Sizes, bytes, with these capacities: of the whole memory of the firmware, and of its parts for
-    /// reordering, irradiance cache and importance sampling. They are extrapolated from probes: the size
+    /// On-chip memory, bytes, that a chip whose gathers wait in card memory leaves free for caches while it
+    /// casts rays, and while it does gathers.
+    pub(super) fn free_bytes(&self) -> [usize; 2] {
+        let queue = self.budget.gather_queue;
+        let empty = |places: usize| (queue as usize).saturating_sub(places) * REQUEST_BYTES;
+        let [.., others] = self.sizes();
+        [empty(places_of_buckets(queue)), empty(places_of_gathering(queue)) + others]
+    }
+
+    /// Sizes, bytes, with these capacities: of the whole memory of the firmware, of its parts for reordering,
+    /// irradiance cache and importance sampling, and of the buffers that are empty while gathers are done
+    /// that have waited in card memory. They are extrapolated from probes: the size
     /// of a buffer is linear in its number of entries, and the size of the chip in its number of tiles in
     /// flight.
-    fn sizes(&self) -> [usize; 4] {
+    fn sizes(&self) -> [usize; 5] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
         let blocks = self.budget.waiting_blocks as usize;
         let [pixels, queue, records, flights] =
@@ -222,9 +234,9 @@ const PROBED: usize = 64;
 
 /// Extrapolates sizes linearly to buffers with the numbers of entries `entries`. The second argument has the
 /// sizes of the smallest probe, then of seven probes that each have twice as many entries in one buffer.
-fn extrapolated(entries: &[usize; 7], [base, doubled @ ..]: &[[usize; 4]; 8]) -> [i64; 4] {
+fn extrapolated(entries: &[usize; 7], [base, doubled @ ..]: &[[usize; 5]; 8]) -> [i64; 5] {
     std::array::from_fn(|i| {
-        let size = |sizes: &[usize; 4]| sizes[i] as i64;
+        let size = |sizes: &[usize; 5]| sizes[i] as i64;
         let slopes = doubled.iter().map(|sizes| size(sizes) - size(base));
         let more = entries.iter().map(|&entries| entries as i64 - PROBED as i64);
         size(base) + slopes.zip(more).map(|(slope, more)| slope * more / PROBED as i64).sum::<i64>()
@@ -233,7 +245,7 @@ fn extrapolated(entries: &[usize; 7], [base, doubled @ ..]: &[[usize; 4]; 8]) ->
 
 /// Sizes of the smallest probe with `FLIGHTS` tiles in flight, and of probes with twice as many entries of
 /// one buffer.
-const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 8] {
+const fn probes<const FLIGHTS: usize>() -> [[usize; 5]; 8] {
     const ONE: usize = PROBED;
     const TWO: usize = 2 * PROBED;
     [
@@ -248,9 +260,10 @@ const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 8] {
     ]
 }
 
-const fn sizes_of<K: FixedKind>() -> [usize; 4] {
+const fn sizes_of<K: FixedKind>() -> [usize; 5] {
     let TechniqueMemory { reordering, irradiance_cache, importance_sampling } = Chip::<K>::TECHNIQUES;
-    [size_of::<Card<K, Dram<'static>>>(), reordering, irradiance_cache, importance_sampling]
+    let empty = Chip::<K>::EMPTY_WHILE_GATHERING;
+    [size_of::<Card<K, Dram<'static>>>(), reordering, irradiance_cache, importance_sampling, empty]
 }
 
 /// Kind of chip that is measured by `size_of` and never built. The parameters are the numbers of pixels,
@@ -325,7 +338,7 @@ mod tests {
             (r#"{"irradiance_records": 100}"#, ["irradiance_records is 100", "power of two"]),
             (r#"{"in_flight": 5}"#, ["in_flight is 5", "at most 4"]),
             (r#"{"tile_pixels": 8192, "waiting_blocks": 64}"#, ["waiting_blocks is 64", "at most 4096"]),
-            (r#"{"gather_queue": 4, "waiting_blocks": 1}"#, ["waiting_blocks is 1", "5 gathers"]),
+            (r#"{"gather_queue": 4, "waiting_blocks": 1}"#, ["waiting_blocks is 1", "8 gathers"]),
             (r#"{"gather_points": 256}"#, ["gather_points is 256", "at least 512"]),
             (r#"{"gather_queue": 1000000}"#, ["sram_bytes is 1048576", "buffers, caches and stack"]),
         ] {

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage, Work};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::layout::{BvhLeaf, PhotonLeaf, WideNode};
 use photoncard_shared::message::Fault;
@@ -160,6 +160,10 @@ impl<M: MemoryPort> MemoryPort for Inspected<M> {
 
     fn begin_tile(&mut self) {
         self.memory.begin_tile();
+    }
+
+    fn begin_work(&mut self, work: Work) {
+        self.memory.begin_work(work);
     }
 }
 

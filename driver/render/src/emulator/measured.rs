@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage, Work};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
@@ -43,6 +43,10 @@ impl MemoryPort for Measured<'_> {
 
     fn begin_tile(&mut self) {
         self.0.begin_tile();
+    }
+
+    fn begin_work(&mut self, work: Work) {
+        self.0.begin_work(work);
     }
 
     fn end_tile(&mut self, tile: u32) {

@@ -21,9 +21,21 @@ pub enum CacheSettings {
         photon: CacheSpec,
         /// Cache for the scene.
         scene: CacheSpec,
+        /// Caches for everything while gathers wait in card memory; `None` for those above.
+        by_work: Option<CachesByWork>,
     },
     /// One cache for everything.
     Unified(CacheSpec),
+}
+
+/// Caches for everything of a chip whose gathers wait in card memory, in the memory that each kind of work
+/// leaves free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CachesByWork {
+    /// Cache while the chip casts rays and completes pixels.
+    pub casting: CacheSpec,
+    /// Cache while it does gathers.
+    pub gathering: CacheSpec,
 }
 
 /// Shape of a cache, in text `SIZE/LINE/WAYS`, and its mapping of addresses to sets.
@@ -50,6 +62,12 @@ impl CacheSpec {
         CacheShape::new(self.bytes, self.line_bytes, self.ways, self.index)
     }
 
+    /// The cache with as many whole sets as have room in its bytes.
+    pub(super) fn in_whole_sets(self) -> Self {
+        let set = self.line_bytes * self.ways;
+        Self { bytes: self.bytes - self.bytes % set, ..self }
+    }
+
     /// Returns whether the shape is valid; in particular, the size must be a whole number of sets.
     pub(super) fn is_possible(&self) -> bool {
         self.shape().is_ok()
@@ -66,7 +84,7 @@ impl CacheSpec {
 
 impl Default for CacheSettings {
     fn default() -> Self {
-        Self::Split { photon: CacheSpec::PHOTON, scene: CacheSpec::SCENE }
+        Self::Split { photon: CacheSpec::PHOTON, scene: CacheSpec::SCENE, by_work: None }
     }
 }
 
@@ -84,8 +102,11 @@ impl fmt::Display for CacheSpec {
 impl fmt::Display for CacheSettings {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let index = match self {
-            Self::Split { photon, scene } => {
+            Self::Split { photon, scene, by_work } => {
                 write!(f, "photon={photon},scene={scene}")?;
+                if let Some(CachesByWork { casting, gathering }) = by_work {
+                    write!(f, ",casting={casting},gathering={gathering}")?;
+                }
                 photon.index
             }
             Self::Unified(cache) => {
@@ -101,11 +122,14 @@ impl FromStr for CacheSettings {
     type Err = String;
 
     /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash` or `unified=256K/128/8,index=hash`. Parts that
-    /// are left out have default values.
+    /// are left out have default values. The parts `casting` and `gathering` ([`CachesByWork`]) come together,
+    /// and there are none by default.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;
         let mut unified = None;
+        let mut casting = None;
+        let mut gathering = None;
         let mut index = None;
         for part in text.split(',') {
             let (name, value) = part.split_once('=').ok_or_else(|| usage(part))?;
@@ -113,6 +137,8 @@ impl FromStr for CacheSettings {
                 "photon" => photon.replace(cache(value)?).is_some(),
                 "scene" => scene.replace(cache(value)?).is_some(),
                 "unified" => unified.replace(cache(value)?).is_some(),
+                "casting" => casting.replace(cache(value)?).is_some(),
+                "gathering" => gathering.replace(cache(value)?).is_some(),
                 "index" => index.replace(set_index(value)?).is_some(),
                 _ => return Err(usage(part)),
             };
@@ -122,14 +148,22 @@ impl FromStr for CacheSettings {
         }
         let index = index.unwrap_or_default();
         let with_index = |spec: CacheSpec| CacheSpec { index, ..spec };
+        let by_work = match (casting, gathering) {
+            (Some(casting), Some(gathering)) => {
+                Some(CachesByWork { casting: with_index(casting), gathering: with_index(gathering) })
+            }
+            (None, None) => None,
+            _ => return Err("casting and gathering are two kinds of work: give a cache for each".into()),
+        };
         match unified {
-            Some(_) if photon.is_some() || scene.is_some() => {
-                Err("unified replaces the caches photon and scene: give unified, or photon and scene".into())
+            Some(_) if photon.is_some() || scene.is_some() || by_work.is_some() => {
+                Err("unified replaces all other caches: give unified, or the others".into())
             }
             Some(unified) => Ok(Self::Unified(with_index(unified))),
             None => Ok(Self::Split {
                 photon: with_index(photon.unwrap_or(CacheSpec::PHOTON)),
                 scene: with_index(scene.unwrap_or(CacheSpec::SCENE)),
+                by_work,
             }),
         }
     }
@@ -137,8 +171,8 @@ impl FromStr for CacheSettings {
 
 fn usage(part: &str) -> String {
     format!(
-        "{part:?} is no part of a cache; use photon=SIZE/LINE/WAYS, scene=SIZE/LINE/WAYS or unified=SIZE/LINE/WAYS, and \
-         index=modulo or index=hash, such as photon=128K/128/4,scene=75K/128/4"
+        "{part:?} is no part of a cache; use photon=SIZE/LINE/WAYS, scene=SIZE/LINE/WAYS or unified=SIZE/LINE/WAYS, \
+         casting and gathering for gathers that wait in card memory, and index=modulo or index=hash, such as photon=128K/128/4,scene=75K/128/4"
     )
 }
 
@@ -188,7 +222,15 @@ impl CacheSettings {
     pub fn over<M: MemoryPort>(&self, memory: M) -> ModelledMemory<M> {
         let dram = Counted::new(memory);
         Inspected::new(Counted::new(match self {
-            Self::Split { photon, scene } => LineCaches::new(dram, photon.cache(), scene.cache()),
+            Self::Split { photon, scene, by_work } => {
+                let caches = LineCaches::new(dram, photon.cache(), scene.cache());
+                match by_work {
+                    Some(CachesByWork { casting, gathering }) => {
+                        caches.with_work(casting.cache(), gathering.cache())
+                    }
+                    None => caches,
+                }
+            }
             Self::Unified(cache) => LineCaches::unified(dram, cache.cache()),
         }))
     }
@@ -278,9 +320,12 @@ mod tests {
     fn caches_are_read_as_they_are_written() {
         let default = CacheSettings::default();
         assert_eq!("photon=128K/128/4,scene=75K/128/4".parse(), Ok(default));
-        for text in
-            ["photon=64K/256/2,scene=75K/128/4,index=hash", "unified=1024K/128/16", "unified=2304/128/3"]
-        {
+        for text in [
+            "photon=64K/256/2,scene=75K/128/4,index=hash",
+            "unified=1024K/128/16",
+            "unified=2304/128/3",
+            "photon=64K/256/2,scene=75K/128/4,casting=512K/128/4,gathering=600K/128/4,index=hash",
+        ] {
             let settings: CacheSettings = text.parse().unwrap();
             assert_eq!(settings.to_string(), text);
             settings.over(Lines(&[]));
@@ -306,7 +351,9 @@ mod tests {
             ("photon=99999M/128/4", "too large"),
             ("photon=1000M/128/4", "above"),
             ("photon=128K/128/4,photon=128K/128/4", "twice"),
-            ("unified=128K/128/4,scene=128K/128/4", "unified replaces the caches"),
+            ("unified=128K/128/4,scene=128K/128/4", "unified replaces all other caches"),
+            ("casting=128K/128/4", "a cache for each"),
+            ("unified=128K/128/4,casting=128K/128/4,gathering=128K/128/4", "unified replaces"),
             ("index=random", "modulo or hash"),
             ("texture=1K/128/1", "photon=SIZE"),
         ] {

@@ -19,8 +19,9 @@ use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{
     self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
-use photoncard_firmware::memory::CardMemory;
+use photoncard_firmware::memory::{CacheEntry, CardMemory};
 use photoncard_firmware::serve::serve;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
@@ -31,7 +32,7 @@ use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};
 pub use self::measured::Measured;
-use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
+use self::memory_model::{CacheSettings, CacheSpec, CachesByWork, MeasuredMemory, MemoryTraffic};
 pub(crate) use self::tile_lines::TileLines;
 use self::tile_lines::TileMeter;
 use self::trace::TraceFile;
@@ -113,12 +114,20 @@ impl EmulatedKind {
         *self.emulated().budget()
     }
 
-    /// Model of the caches of this kind: the sizes of its budget, with four ways.
+    /// Model of the caches of this kind: the sizes of its budget, with four ways. While gathers wait in card
+    /// memory, one cache takes their memory and that which the chip leaves free.
     pub fn caches(self) -> CacheSettings {
         let budget = self.budget();
+        let cache = |bytes: u32| CacheSpec { bytes, ..CacheSpec::PHOTON };
+        let all = |free: usize| {
+            let lines = (cache_bytes(&budget) + free) / (LINE_BYTES + size_of::<CacheEntry>());
+            cache((lines * LINE_BYTES) as u32).in_whole_sets()
+        };
+        let [casting, gathering] = self.emulated().free_bytes().map(all);
         CacheSettings::Split {
-            photon: CacheSpec { bytes: budget.photon_cache_bytes, ..CacheSpec::PHOTON },
-            scene: CacheSpec { bytes: budget.scene_cache_bytes, ..CacheSpec::SCENE },
+            photon: cache(budget.photon_cache_bytes),
+            scene: cache(budget.scene_cache_bytes),
+            by_work: (budget.waiting_blocks > 0).then_some(CachesByWork { casting, gathering }),
         }
     }
 
@@ -282,4 +291,52 @@ fn serve_on<M: CardMemory, R>(
     // The end of the link is no error: a host ends a card by closing the link.
     let _ = serve(&mut card, port);
     end(card.memory())
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::gather::REQUEST_BYTES;
+
+    use super::*;
+
+    /// Memory of a cache with its tags, bytes.
+    fn taken(cache: CacheSpec) -> usize {
+        cache.bytes as usize / LINE_BYTES * (LINE_BYTES + size_of::<CacheEntry>())
+    }
+
+    /// The figures of `docs/memory.md`.
+    #[test]
+    fn the_reference_and_the_large_chip_have_large_caches_by_work() {
+        for (kind, caches) in [
+            (
+                EmulatedKind::Reference,
+                "photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=809K/128/4",
+            ),
+            (
+                EmulatedKind::Large,
+                "photon=128K/128/4,scene=128K/128/4,casting=879K/128/4,gathering=1720832/128/4",
+            ),
+        ] {
+            assert_eq!(kind.caches().to_string(), caches);
+        }
+    }
+
+    #[test]
+    fn caches_by_work_take_the_memory_that_the_work_leaves_free() {
+        for kind in EmulatedKind::ALL {
+            let CacheSettings::Split { photon, scene, by_work: Some(by_work) } = kind.caches() else {
+                panic!("{kind:?}")
+            };
+            let [casting, gathering] = [by_work.casting, by_work.gathering].map(taken);
+            let free = kind.emulated().free_bytes();
+            let set = taken(CacheSpec { bytes: photon.line_bytes * photon.ways, ..photon });
+            for (cache, free) in [casting, gathering].into_iter().zip(free) {
+                let room = taken(photon) + taken(scene) + free;
+                assert!((room - set..=room).contains(&cache), "{kind:?}: {cache} of {room}");
+            }
+            // The queue, and what waits or is in use while gathers are done, are beside the cache.
+            let queue = kind.budget().gather_queue as usize * REQUEST_BYTES;
+            assert!(gathering + queue / 4 < kind.sram_bytes() && casting < kind.sram_bytes());
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage, Work};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
@@ -59,6 +59,10 @@ impl<M: MeasuredMemory> MemoryPort for TileMeter<M> {
 
     fn begin_tile(&mut self) {
         self.memory.begin_tile();
+    }
+
+    fn begin_work(&mut self, work: Work) {
+        self.memory.begin_work(work);
     }
 
     fn end_tile(&mut self, tile: u32) {

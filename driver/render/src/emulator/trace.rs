@@ -3,8 +3,8 @@
 //!
 //! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
 //! blank, and a byte address in hexadecimal. Label 0 is a read of data, label 1 a write of a line. Label 4 is
-//! Dinero's escape that flushes its caches; it is written at the beginning of every tile with address 0. A
-//! labelled trace adds the structure, the stage and the number of bytes of the read to the line; Dinero
+//! Dinero's escape that flushes its caches; it is written with address 0 at the beginning of every tile, and
+//! where a chip whose gathers wait in card memory begins to cast rays or to do gathers. A labelled trace adds the structure, the stage and the number of bytes of the read to the line; Dinero
 //! ignores them. Below the caches, each line of text is a fetch or a write of one line of card memory, in the
 //! format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
 
@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use photoncard_firmware::memory::Stage;
+use photoncard_firmware::memory::{Stage, Work};
 use photoncard_picture::choice::{Choice, choices};
 use photoncard_picture::output::{OutputError, PendingFile};
 use photoncard_shared::address::{LINE_BYTES, Structure};
@@ -146,6 +146,15 @@ impl TraceFile {
     pub(super) fn begin_tile(&mut self) {
         if !self.is_below_caches() {
             self.add(format_args!("{FLUSH} 0"));
+        }
+    }
+
+    /// Marks the beginning of another kind of work, at which caches are empty too.
+    pub(super) fn begin_work(&mut self, work: Work) {
+        if self.settings.has_labels {
+            self.add(format_args!("{FLUSH} 0 {}", work.name()));
+        } else {
+            self.begin_tile();
         }
     }
 

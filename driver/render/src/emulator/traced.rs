@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
+use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage, Work};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
@@ -60,6 +60,13 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
         }
         self.memory.begin_tile();
     }
+
+    fn begin_work(&mut self, work: Work) {
+        if let Some(trace) = &mut self.trace {
+            trace.begin_work(work);
+        }
+        self.memory.begin_work(work);
+    }
 }
 
 impl<M: MeasuredMemory> MeasuredMemory for Traced<M> {
@@ -98,16 +105,16 @@ mod tests {
     use crate::emulator::trace::{TraceFormat, TraceSettings};
 
     #[test]
-    fn a_trace_has_a_flush_per_tile_and_the_lines_of_its_reads_and_writes() {
+    fn a_trace_has_a_flush_per_tile_and_work_and_the_lines_of_its_reads_and_writes() {
         let folder = tempfile::tempdir().unwrap();
         use TraceFormat::{Dinero, Dramsim3, Ramulator};
         for (format, has_labels, used, expected) in [
-            (Dinero, false, 20..40, "4 0\n0 114\n4 0\n0 94\n1 80\n"),
+            (Dinero, false, 20..40, "4 0\n4 0\n0 114\n4 0\n4 0\n0 94\n1 80\n"),
             (
                 Dinero,
                 true,
                 20..40,
-                "4 0\n0 114 photons gather 20\n4 0\n0 94 photons gather 20\n1 80 waiting gather 128\n",
+                "4 0\n4 0 casting\n0 114 photons gather 20\n4 0\n4 0 casting\n0 94 photons gather 20\n1 80 waiting gather 128\n",
             ),
             (Ramulator, false, 0..128, "LD 0x100\nLD 0x80\nST 0x80\n"),
             (Dramsim3, false, 0..128, "0x100 READ 0\n0x80 READ 1\n0x80 WRITE 2\n"),
@@ -120,6 +127,7 @@ mod tests {
             memory.read(Structure::Header, LineAddress(0), 0..128).unwrap();
             for line in [2, 1] {
                 memory.begin_tile();
+                memory.begin_work(Work::Casting);
                 memory.enter(Stage::Gather);
                 memory.read(Structure::Photons, LineAddress(line), used.clone()).unwrap();
                 memory.read(Structure::Photons, LineAddress(3), 0..20).unwrap_err();

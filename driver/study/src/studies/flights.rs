@@ -38,7 +38,7 @@ impl Setup {
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
         let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
         let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };
-        let caches = CacheSettings::Split { photon: CacheSpec::PHOTON, scene: scene_cache };
+        let caches = CacheSettings::Split { photon: CacheSpec::PHOTON, scene: scene_cache, by_work: None };
         scale.on_one_chip(scene, settings, self.chip, caches)
     }
 }

@@ -68,7 +68,11 @@ fn of_size(kilobytes: u32) -> CacheSettings {
 }
 
 fn behind(photon: CacheSpec) -> CacheSettings {
-    CacheSettings::Split { photon, scene: CacheSpec { index: photon.index, ..CacheSpec::SCENE } }
+    CacheSettings::Split {
+        photon,
+        scene: CacheSpec { index: photon.index, ..CacheSpec::SCENE },
+        by_work: None,
+    }
 }
 
 fn point(scale: &Scale, order: Order, layout: PhotonLayout, caches: CacheSettings) -> Point {

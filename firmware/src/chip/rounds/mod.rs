@@ -22,7 +22,7 @@ mod work;
 use core::ops::Range;
 
 use heapless::Vec;
-use photoncard_shared::budget::{Budget, GATHERS_PER_LINE, gather_buckets};
+use photoncard_shared::budget::{Budget, LEAST_GATHERS_OF_LINE, gather_buckets};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant, Tile};
 
@@ -379,7 +379,7 @@ impl Reserve {
 /// Upper bound of the number of lines of a round with `gathers` gathers, without the states of blocks other
 /// than the present one. `blocks` is the number of blocks, the present one among them.
 fn lines_of(gathers: u64, blocks: usize, reserve: &Reserve) -> u64 {
-    let lines = gathers.div_ceil(GATHERS_PER_LINE as u64) + gathers.div_ceil(RESULTS_PER_LINE as u64);
+    let lines = gathers.div_ceil(LEAST_GATHERS_OF_LINE as u64) + gathers.div_ceil(RESULTS_PER_LINE as u64);
     // Each chain of a bucket or of results has one incomplete line.
     lines + u64::from(reserve.buckets) + blocks as u64 + u64::from(reserve.block)
 }
@@ -421,6 +421,7 @@ mod tests {
     use std::vec;
 
     use photoncard_shared::address::Line;
+    use photoncard_shared::budget::MOST_GATHERS_OF_LINE;
     use proptest::prelude::*;
 
     use super::*;
@@ -437,7 +438,7 @@ mod tests {
         let (mut memory, mut room) = (Dram::new(&mut lines), Room::new(1, 1 + 2 * gathers.len() as u32));
         let mut buckets = Buckets::<Entries<BUCKETS>>::new();
         buckets.clear();
-        let mut held = [GatherRequest::NONE; BUCKETS * GATHERS_PER_LINE];
+        let mut held = [GatherRequest::NONE; BUCKETS * MOST_GATHERS_OF_LINE];
         let mut results = [Results::VACANT; BLOCKS];
         for &(bucket, block) in gathers {
             let position = HilbertCode::of_bits((bucket as u64) << 62);

@@ -1,7 +1,6 @@
 //! Work of a chip in rounds: which block proceeds, and the gathers of a round.
 
 use photoncard_shared::address::{Stage, Structure};
-use photoncard_shared::budget::GATHERS_PER_LINE;
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant};
 
 use super::super::flight::{Flight, allowed_error};
@@ -11,7 +10,7 @@ use super::super::{Chip, GATHERS_PER_PIECE, Progress};
 use super::{OpenTile, Phase, Unfinished, WaitingBlock, first_gathers, gathers_of_pixels};
 use crate::gather::{GatherResult, PointIndex, WrittenResults};
 use crate::kind::{Array, ChipKind, Vacant};
-use crate::memory::{MemoryPort, WordReader, WordWriter};
+use crate::memory::{MemoryPort, WordReader, WordWriter, Work};
 use crate::render::RenderJob;
 
 /// Index of the only tile in flight in a frame that is rendered in rounds.
@@ -228,6 +227,7 @@ impl<K: ChipKind> Chip<K> {
         let is_last = end == self.shared.gathers.buckets();
         if is_last {
             self.shared.gathers.clear();
+            job.memory.begin_work(Work::Gathering);
         }
         self.shared.rounds.phase = if is_last { Phase::Reading(0) } else { Phase::Closing(end) };
         Ok(Progress::Busy)
@@ -247,18 +247,15 @@ impl<K: ChipKind> Chip<K> {
         }
         job.memory.enter(Stage::Gather);
         let gathers = &mut self.shared.gathers;
-        let room = |gathers: &super::super::buffers::SharedGathers<K>| {
-            gathers.len() + GATHERS_PER_LINE <= gathers.capacity(job.frame).max(GATHERS_PER_LINE)
-        };
         for _ in 0..LINES_PER_PIECE {
-            if bucket == gathers.buckets() || !room(gathers) {
+            if bucket == gathers.buckets() || !gathers.has_room_for_line(job.frame) {
                 break;
             }
             bucket += usize::from(!gathers.read_bucket(job.memory, bucket)?);
         }
         let is_last = bucket == gathers.buckets();
         self.shared.rounds.phase = Phase::Reading(bucket);
-        if is_last || !room(&self.shared.gathers) {
+        if is_last || !self.shared.gathers.has_room_for_line(job.frame) {
             self.begin_drain_of_round()?;
         }
         if is_last && self.shared.gathers.is_empty() {
@@ -308,6 +305,7 @@ impl<K: ChipKind> Chip<K> {
         }
         rounds.end_gathers();
         self.shared.gathers.empty_buckets();
+        job.memory.begin_work(Work::Casting);
         Ok(())
     }
 }

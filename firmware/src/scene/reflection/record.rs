@@ -44,6 +44,17 @@ impl PartialReflection {
         Self { diffuse: Rgbe(diffuse), lobe: Rgbe(lobe), shape: Shape(shape), normal: *normal }
     }
 
+    /// Encodes a reflection function without a lobe; `None` if it has one, even a black one.
+    pub fn to_lambertian_bytes(self) -> Option<[u8; 5]> {
+        let Self { diffuse: Rgbe([a, b, c, d]), lobe, shape, normal } = self;
+        (lobe == Self::NONE.lobe && shape == Self::NONE.shape).then_some([a, b, c, d, normal])
+    }
+
+    /// Reflection function of the bytes that [`Self::to_lambertian_bytes`] returned.
+    pub fn from_lambertian_bytes([a, b, c, d, normal]: [u8; 5]) -> Self {
+        Self { diffuse: Rgbe([a, b, c, d]), normal, ..Self::NONE }
+    }
+
     /// Encodes `weight` times a reflector's `f` towards its outgoing direction. Colours are rounded to a
     /// shared exponent, at random by the bits of `dither`, so that the rounding is unbiased.
     // One copy for final gathers and caustics: code is memory on a chip.
@@ -61,12 +72,15 @@ impl PartialReflection {
             // Rays follow the sheen lobe: no photon is gathered for it.
             Lobe::Sheen(_) => (Shape([0; 4]), Vec3::ZERO, 0.0),
         };
-        Self {
+        let record = Self {
             diffuse: Rgbe::encode((reflector.lambertian() * weight).to_array(), dither),
             lobe: Rgbe::encode((colour * weight * factor).to_array(), dither),
             shape,
             normal: encode_normal(reflector.normal.to_array()),
-        }
+        };
+        // A Phong lobe of no colour has no shape, so that the record is that of a Lambertian surface.
+        let is_plain = record.is_lambertian() && !record.is_of_microfacets();
+        if is_plain { Self { shape: Self::NONE.shape, ..record } } else { record }
     }
 
     /// Encodes a reflection that is evaluated at once instead of being put into the gather queue. Also
