@@ -23,6 +23,7 @@ mod sample;
 mod scale;
 mod store;
 mod studies;
+mod symbol_axes;
 mod whole_frame;
 
 use std::path::{Path, PathBuf};
@@ -39,12 +40,12 @@ use self::report::Report;
 pub use self::report::{Cell, Figure, Provenance, ReportError, human};
 pub use self::sample::{Estimate, SampleRate};
 pub use self::scale::Scale;
-use self::scale::machine_row;
 pub use self::store::StoreError;
-pub use self::studies::{Study, Sweep};
+use self::studies::SweptScene;
+pub use self::studies::{Hardware, Study, Sweep};
+pub use self::symbol_axes::{SymbolAxes, SymbolAxesError};
 pub use self::whole_frame::{FrameOutcome, WholeFrame};
 use photoncard_picture::choice::Choice;
-use photoncard_render::cost_model::Machine;
 use photoncard_scene::{Scene, SceneContents};
 
 /// Options of [`run`]: the studies, their scale, and the folders that they read and write.
@@ -107,8 +108,6 @@ pub struct SweepOptions {
     pub out: PathBuf,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
-    /// Machine for which the report's times are computed.
-    pub machine: Machine,
     /// Provenance of the numbers. The report adds its settings.
     pub provenance: Provenance,
 }
@@ -120,7 +119,7 @@ pub struct SweepOptions {
 /// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the
 /// sweep.
 pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
-    let SweepOptions { sweep, name, scene, out, threads, machine, mut provenance } = options;
+    let SweepOptions { sweep, name, scene, out, threads, mut provenance } = options;
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
@@ -128,12 +127,13 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
             Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
         point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
     }
+    let checksum = scene.checksum().to_owned();
     let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;
     laboratory.add(&name, scene);
     let results = laboratory.measure("sweep", sweep.points())?;
     provenance.settings.extend(sweep.rows());
-    provenance.settings.push(machine_row(&machine));
-    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results, &machine) })?)
+    let scene = SweptScene { name: &name, checksum: &checksum };
+    Ok(report::write(&out, &Report { provenance, ..sweep.report(scene, &results) })?)
 }
 
 fn folder(options: &StudyOptions, study: Study) -> PathBuf {

@@ -117,7 +117,7 @@ impl Point {
         let mut key = json!({
             "identity": identity(&self.settings, scene),
             "work": self.settings.of_work(),
-            "chip": self.chip().budget(),
+            "chip": self.chip().emulated().to_json(),
             "scene": self.scene,
             "set": self.assignments,
         });

@@ -13,7 +13,7 @@ use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{
-    Axis, AxisError, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
+    Axis, AxisError, Hardware, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
     StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
 };
 
@@ -228,7 +228,7 @@ fn a_missing_scene_is_named_with_its_folder() {
 }
 
 /// Sweep of a small scene over orders and caches.
-fn sweep() -> Sweep {
+fn sweep(machine: Machine) -> Sweep {
     let axis = |name: &str, values: &[&str]| Axis {
         name: name.to_owned(),
         values: values.iter().map(|&value| value.to_owned()).collect(),
@@ -238,19 +238,23 @@ fn sweep() -> Sweep {
     let point = |values: Vec<(&str, &str)>| {
         let [(_, order), (_, caches)] = values[..] else { panic!("{values:?}") };
         let settings = tiny().settings(GatherOrder::of_name(order).unwrap());
-        Ok::<_, AxisError>(tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()))
+        let hardware = Hardware::new(&EmulatedKind::Reference.into(), machine);
+        Ok::<_, AxisError>((tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()), hardware))
     };
     Sweep::new(axes, point).unwrap()
 }
 
 fn sweep_options(out: &Path) -> SweepOptions {
+    sweep_options_on(out, Machine::NOMINAL)
+}
+
+fn sweep_options_on(out: &Path, machine: Machine) -> SweepOptions {
     SweepOptions {
-        sweep: sweep(),
+        sweep: sweep(machine),
         name: "mine.gltf".to_owned(),
         scene: gltf::load(&scenes().join("cornell.gltf")).unwrap(),
         out: out.to_owned(),
         threads: Some(2),
-        machine: Machine::NOMINAL,
         provenance: Provenance::here("photoncard study sweep"),
     }
 }
@@ -277,9 +281,11 @@ fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
         "by-order.svg",
         "index.html",
         "points.csv",
+        "points.json",
         "structures-by-cache.svg",
         "structures-by-order.svg",
         "structures.csv",
+        "structures.json",
     ];
     assert_eq!(names, expected);
     let values: Vec<_> =
@@ -298,18 +304,20 @@ fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
     assert_eq!(again.measured(), 0);
 }
 
-/// Seconds of memory and of arithmetic, the last two columns of a sweep's points.
+/// Seconds of memory and of arithmetic of a sweep's points.
 fn seconds(path: &Path) -> [Vec<f64>; 2] {
-    [2, 1].map(|from_end| rows(path).iter().map(|row| row[row.len() - from_end].parse().unwrap()).collect())
+    let rows: Vec<serde_json::Value> = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    ["chip's memory (s)", "chip's arithmetic (s)"]
+        .map(|column| rows.iter().map(|row| row[column].as_f64().unwrap()).collect())
 }
 
 #[test]
 fn another_machine_changes_times_of_the_points_that_are_measured_already() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("points.csv");
+    let path = folder.path().join("points.json");
     let run_on = |machine| {
         let observer = Counting::up_to(usize::MAX);
-        run_sweep(SweepOptions { machine, ..sweep_options(folder.path()) }, &observer).unwrap();
+        run_sweep(sweep_options_on(folder.path(), machine), &observer).unwrap();
         (observer.measured(), seconds(&path))
     };
     let Machine { bandwidth, flops, .. } = Machine::NOMINAL;
@@ -329,8 +337,8 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
     let observer = Counting::up_to(usize::MAX);
     let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
     let on = |chip, settings| {
-        let task =
-            Task::Traffic { chip, caches: CacheSettings::default(), sample: SampleRate::ALL, least_tiles: 1 };
+        let (caches, sample) = (CacheSettings::default(), SampleRate::ALL);
+        let task = Task::Traffic { chip, caches, sample, least_tiles: 1 };
         Point { task, ..tiny().traffic("cornell.gltf", settings) }
     };
     let sorted = tiny().settings(GatherOrder::Sort).with(|s| s.integrator.gather_rays = 32);

@@ -4,17 +4,16 @@ mod sweep;
 
 use std::fmt::Write;
 use std::io::IsTerminal;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-use photoncard_driver::cost_model::Machine;
+use miette::MietteDiagnostic;
 use photoncard_driver::study::{
-    Provenance, Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep,
+    Provenance, StudyError, StudyObserver, StudyOptions, run as study, run_sweep,
 };
 
-use crate::arguments::{Selection, StudyArguments, StudyCommand, StudyOutput};
+use crate::arguments::{StudyArguments, StudyCommand};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::remaining::Remaining;
@@ -26,38 +25,40 @@ const STOPPED: &str = "stopped; finished points are kept: run the command again 
 
 /// Runs built-in studies, or a sweep, and writes their reports.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+    let provenance = Provenance::here(&command_line());
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
-            let options = sweep::options(sweep, Provenance::here(&command_line()))?;
+            let options = sweep::options(sweep, provenance)?;
             observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
         }
-        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes, machine } => {
-            run_shipped(*name, output, *quick, scenes, machine.machine())
+        StudyArguments { own: None, name: Some(name), output: Some(output), scenes, .. } => {
+            let scale = arguments.scale(*name, output.sample).map_err(|reason| refused(&reason))?;
+            let options = StudyOptions {
+                studies: name.studies(),
+                scale,
+                scenes: scenes.to_owned(),
+                out: output.out.clone(),
+                is_collection: name.is_collection(),
+                threads: output.threads,
+                provenance,
+            };
+            run_shipped(&options, output.quiet)
         }
         _ => unreachable!("name and output are required without a command"),
     }
 }
 
-fn run_shipped(
-    name: Selection,
-    output: &StudyOutput,
-    quick: bool,
-    scenes: &Path,
-    machine: Machine,
-) -> Result<(), Failure> {
-    let options = StudyOptions {
-        studies: name.studies(),
-        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample).on(machine),
-        scenes: scenes.to_owned(),
-        out: output.out.clone(),
-        is_collection: name.is_collection(),
-        threads: output.threads,
-        provenance: Provenance::here(&command_line()),
-    };
+/// Failure of arguments that are not possible together.
+fn refused(reason: &str) -> Failure {
+    let help = "photoncard study --help names the options of each study";
+    Failure::input(MietteDiagnostic::new(reason).with_help(help))
+}
+
+fn run_shipped(options: &StudyOptions, quiet: bool) -> Result<(), Failure> {
     if let Some(banner) = options.scale.banner() {
         say(format_args!("photoncard: {banner}"));
     }
-    observed(output.quiet, |progress| study(&options, progress).map_err(failure))
+    observed(quiet, |progress| study(options, progress).map_err(failure))
 }
 
 /// Runs `work`. Its progress is shown unless `quiet`.

@@ -6,14 +6,15 @@ use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::render::ChipModel;
 use photoncard_driver::scene::Scene;
-use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Provenance, Sweep, SweepOptions, Task};
+use photoncard_driver::study::{
+    ALONG_CURVE, AxisError, Hardware, Point, Provenance, Sweep, SweepOptions, Task,
+};
 
 use crate::arguments::{
-    Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
+    Arguments, CACHE, CHIP, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
 };
 use crate::console::say;
 use crate::failure::Failure;
@@ -27,7 +28,7 @@ type Value<'a> = (&'a str, &'a str);
 pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u64::from(u32::MAX))?;
     let name = input::name(&arguments.scene);
-    let picture = arguments.point(&name).settings.picture;
+    let picture = arguments.point(&name, arguments.model()).settings.picture;
     notices::say_ignored(&arguments.scene, &scene, &Uses::of(&arguments.scene, &picture, None))?;
     let mut notices = BTreeSet::new();
     let sweep = Sweep::new(arguments.axes(), |values| {
@@ -44,34 +45,45 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     settings.push(("scene-checksum".to_owned(), scene.checksum().to_owned()));
     let provenance = Provenance { settings, ..provenance };
     let StudyOutput { out, threads, .. } = &arguments.output;
-    let (out, threads, machine) = (out.clone(), *threads, arguments.machine.machine());
-    Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
+    let (out, threads) = (out.clone(), *threads);
+    Ok(SweepOptions { sweep, name, scene, out, threads, provenance })
 }
 
-/// Returns the point of the sweep at which the options have these values, and adds notices about it to
-/// `notices`. If no size is stated, the picture has the camera's aspect ratio.
+/// Returns the point of the sweep at which the options have these values, with its hardware, and adds notices
+/// about it to `notices`. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],
     scene: &Scene,
     notices: &mut BTreeSet<String>,
-) -> Result<Point, Failure> {
+) -> Result<(Point, Hardware), Failure> {
     let (caches, others): (Vec<_>, Vec<_>) = values.iter().copied().partition(|(name, _)| *name == CACHE);
+    let (capacities, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|(name, _)| name.starts_with(CHIP));
     let (curve, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|value| *value == ("order", ALONG_CURVE));
     let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
     let arguments = replaced.as_ref().unwrap_or(arguments);
-    let mut point = arguments.point(&input::name(&arguments.scene));
+    let model = with_capacities(arguments.model().clone(), &capacities)?;
+    let mut point = arguments.point(&input::name(&arguments.scene), &model);
     point.is_along_curve = !curve.is_empty();
     if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
         *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
     }
-    if let Task::Traffic { chip, caches, .. } = &point.task {
-        notices.extend(beyond_chip(*chip, caches));
+    if let Task::Traffic { caches, .. } = &point.task {
+        notices.extend(beyond_chip(&model, caches));
     }
     let camera = point.settings.camera(scene)?;
     notices.extend(arguments.picture().fit(&camera, &mut point.settings.picture));
-    Ok(point)
+    Ok((point, arguments.hardware(&model)))
+}
+
+/// Replaces capacities of a chip by values of `--vary chip.NAME=`.
+fn with_capacities(model: ChipModel, values: &[Value]) -> Result<ChipModel, Failure> {
+    values.iter().try_fold(model, |model, (name, value)| {
+        let capacity = name.strip_prefix(CHIP).unwrap_or(name);
+        model.with_capacity(capacity, value).map_err(|error| refused(values, &error.to_string()))
+    })
 }
 
 /// Parses this process's arguments with `values` added; `None` if there are no values.
@@ -96,17 +108,16 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
 }
 
 /// Notice about caches that are larger than the on-chip memory of `chip`.
-fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
+fn beyond_chip(chip: &ChipModel, caches: &CacheSettings) -> Option<String> {
     let sizes = match caches {
         CacheSettings::Split { photon, scene } => [photon.bytes, scene.bytes],
         CacheSettings::Unified(both) => [both.bytes, 0],
     };
-    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.budget().sram_bytes));
+    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.kind().budget().sram_bytes));
     (taken > all).then(|| {
         format!(
-            "cache={caches} takes {taken} bytes, and the chip {} has {all} in all: its traffic is that of a \
-             larger chip",
-            chip.name()
+            "cache={caches} takes {taken} bytes, and the chip {chip} has {all} in all: its traffic is that of a \
+             larger chip"
         )
     })
 }
@@ -147,6 +158,9 @@ impl From<AxisError> for PointError {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_driver::choice::Choice;
+    use photoncard_driver::emulator::EmulatedKind;
+
     use super::*;
 
     #[test]
@@ -157,7 +171,7 @@ mod tests {
             (EmulatedKind::Reference, "photon=1M/128/16,scene=75K/128/4", true),
             (EmulatedKind::Micro, "unified=512K/128/16", true),
         ] {
-            let said = beyond_chip(chip, &caches.parse().unwrap());
+            let said = beyond_chip(&chip.into(), &caches.parse().unwrap());
             assert_eq!(said.is_some_and(|said| said.contains(chip.name())), is_beyond, "{caches}");
         }
     }

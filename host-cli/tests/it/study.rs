@@ -27,6 +27,19 @@ fn wrong_arguments_are_refused_with_a_remedy() {
     refused(&["scaling", "--out", "out"], &["cornell.gltf", "scenes", "--scenes"]);
     refused(&["scaling", "--out", "out", "--scenes", "nowhere"], &["cornell.gltf", "nowhere", "--scenes"]);
     refused(&["scaling", "--out", "taken"], &["taken", "--out"]);
+    for name in ["techniques", "figure-6.17", "all"] {
+        refused(
+            &[name, "--out", "out", "--card", "emulated-micro"],
+            &["--card emulated-micro is not for", "table-7.1"],
+        );
+    }
+    refused(&["table-7.1", "--out", "out", "--card", "serial:a"], &["serial:a", "emulated:CHIP.toml"]);
+    refused(&["table-7.1", "--out", "out", "--vary", "R_IC=2"], &["R_IC cannot be", "from 0 to 1"]);
+    refused(&["table-7.1", "--out", "out", "--vary", "tile=8"], &["no symbol", "R_IC"]);
+    refused(
+        &["scaling", "--out", "out", "--vary", "R_IC=0.5"],
+        &["--vary is of symbols of table-7.1", "sweep"],
+    );
 }
 
 #[cfg(unix)]
@@ -168,6 +181,10 @@ fn sweeps_that_are_not_possible_are_refused_with_value_and_remedy() {
         (&["--vary", "order=hilbert", "--card", "emulated-micro"], &["--order hilbert", "--card emulated"]),
         (&["--vary", "set=flor.diffuse=1"], &["flor", "floor"]),
         (&["--vary", "camera=eye,back"], &["back", "eye"]),
+        (&["--vary", "chip.queue=5"], &["\"chip.queue\"", "chip.gather_queue"]),
+        (&["--vary", "chip.in_flight=1,9"], &["chip.in_flight=9", "from 1 to 8"]),
+        (&["--vary", "chip.sram_bytes=9000"], &["chip.sram_bytes=9000", "parts take", "photon cache 131072"]),
+        (&["--card", "emulated:absent.toml"], &["--card", "absent.toml cannot be read"]),
         (&["--cache", "8K"], &["--cache", "photon=128K/128/4"]),
         (&["--vary", "cache=photon=8K/128/4,scene=8K/128/4"], &["parts of one cache", "by semicolons"]),
         (&["--latency", "50"], &["unexpected argument", "--latency"]),
@@ -195,4 +212,64 @@ fn a_quick_study_says_that_it_is_a_trial() {
     assert_eq!(outcome.status, Some(2));
     let first = outcome.stderr.lines().next().unwrap();
     assert!(first.starts_with("photoncard: Trial, no result: 128x128 pixels"), "{first}");
+}
+
+/// A chip of a file is measured with the file's capacities and caches, timed with its rates, and its
+/// capacities can be varied.
+#[test]
+fn a_sweep_measures_the_chip_of_a_file() {
+    let (room, cornell) = (Room::new(), shipped("cornell.gltf"));
+    room.write(
+        "chip.toml",
+        "[memory]\ngather_queue = 64\n[caches]\nunified = \"512/128/4\"\n[units]\ngflops = 80\nbandwidth_gb_s = 25\n\
+         [energy]\nflop_pj = 0\n",
+    );
+    let own =
+        ["--card", "emulated:chip.toml", "--vary", "chip.gather_queue=4,64", "--vary", "bandwidth=25,50"];
+    let sweep = [&["study", "sweep", &cornell], &SWEEP[2..], &own, &["--order", "sort"]].concat();
+    let outcome = room.run(&sweep);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let rows: Vec<serde_json::Value> = serde_json::from_slice(&room.read("out/points.json")).unwrap();
+    let column = |name: &str| rows.iter().map(|row| row[name].as_f64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(column("chip.gather_queue"), [4.0, 4.0, 64.0, 64.0]);
+    let drained = column("photon map (GB)");
+    assert!(drained[0] > drained[2], "a shorter queue reads more lines: {drained:?}");
+    let seconds = column("chip's memory (s)");
+    assert!((seconds[0] / seconds[1] - 2.0).abs() < 1e-9, "twice the bandwidth halves the time: {seconds:?}");
+    assert_eq!(column("energy of arithmetic (J)"), [0.0; 4]);
+    let parts = ["energy of caches (J)", "energy of DRAM (J)"].map(column);
+    for (index, sum) in column("energy (J)").into_iter().enumerate() {
+        assert!(sum > 0.0 && (parts[0][index] + parts[1][index]) == sum, "{sum}");
+    }
+    for row in &rows {
+        assert_eq!(row["chip"], "emulated:chip.toml");
+        assert_eq!(
+            (&row["scene"], &row["seed"], &row["photons"]),
+            (&"cornell.gltf".into(), &0.into(), &200.into())
+        );
+    }
+    let page = String::from_utf8(room.read("out/index.html")).unwrap();
+    assert!(page.contains("unified=512/128/4"), "the provenance");
+    assert_eq!(std::fs::read_dir(room.path("out/points")).unwrap().count(), 2);
+}
+
+/// `table-7.1` on a chip of one's own leaves published figures out, and evaluates its formulas for stated
+/// values of symbols.
+#[test]
+fn a_table_is_of_a_chip_of_a_file_and_of_stated_symbols() {
+    let room = Room::new();
+    room.write("chip.toml", "[memory]\ntile_pixels = 1024\n[units]\ngflops = 1\n");
+    let folder = shipped("");
+    let own = ["--scenes", &folder, "--card", "emulated:chip.toml", "--vary", "R_IC=0.2,0.9"];
+    let arguments = [&["study", "table-7.1", "--quick", "--out", "out", "--quiet"], &own[..]].concat();
+    let outcome = room.run(&arguments);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let text = String::from_utf8(room.read("out/varied.csv")).unwrap();
+    let chips = |share: &str| -> f64 {
+        let row = text.lines().find(|row| row.starts_with(&format!("{share},\"table, all")));
+        row.unwrap().rsplit(',').nth(1).unwrap().parse().unwrap()
+    };
+    assert!(chips("0.2") > chips("0.9"), "interpolated pixels take less arithmetic: {text}");
+    let page = String::from_utf8(room.read("out/index.html")).unwrap();
+    assert!(page.contains("emulated:chip.toml") && page.contains("1 GFLOPS"), "the provenance");
 }

@@ -26,7 +26,7 @@ use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
-pub use self::chip_file::{ChipError, MIN_DRAM_BYTES};
+pub use self::chip_file::{Capacities, ChipError, MIN_DRAM_BYTES, SramParts};
 use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};

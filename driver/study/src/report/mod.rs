@@ -63,8 +63,8 @@ pub enum ReportError {
     Output(#[from] OutputError),
 }
 
-/// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, each plot as
-/// `<name>.svg`, and finally `index.html`. Existing files with these names are replaced, each atomically;
+/// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, data as
+/// `<name>.json` too, each plot as `<name>.svg`, and finally `index.html`. Existing files with these names are replaced, each atomically;
 /// other files are left unchanged.
 ///
 /// # Errors
@@ -79,7 +79,7 @@ pub(crate) fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
             return Err(ReportError::BadName { name: name.clone() });
         }
     }
-    let files: Vec<_> = blocks().filter_map(Block::file).collect();
+    let files: Vec<_> = blocks().flat_map(Block::files).collect();
     let mut names = HashSet::new();
     for (file, _) in &files {
         if !names.insert(file.to_ascii_lowercase()) {
