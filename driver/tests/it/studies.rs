@@ -13,8 +13,8 @@ use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{
-    Axis, AxisError, Hardware, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
-    StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Extent, Hardware, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study,
+    StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -76,6 +76,7 @@ fn options(out: &Path, studies: &[Study]) -> StudyOptions {
         is_collection: studies.len() > 1,
         threads: Some(2),
         provenance: Provenance::here("photoncard study"),
+        extent: Extent::Whole,
     }
 }
 
@@ -256,6 +257,7 @@ fn sweep_options_on(out: &Path, machine: Machine) -> SweepOptions {
         out: out.to_owned(),
         threads: Some(2),
         provenance: Provenance::here("photoncard study sweep"),
+        extent: Extent::Whole,
     }
 }
 

@@ -58,7 +58,7 @@ pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
 #[cfg(feature = "study")]
-pub(crate) use self::study::{StudyArguments, StudyCommand};
+pub(crate) use self::study::{StudyArguments, StudyCommand, StudyMergeArguments};
 #[cfg(feature = "study")]
 pub(crate) use self::study_output::StudyOutput;
 #[cfg(feature = "study")]

@@ -13,7 +13,7 @@ use super::machine::MachineOptions;
 use super::study_output::StudyOutput;
 use super::sweep::SweepArguments;
 
-/// Arguments of `photoncard study`: the name of a built-in study, or the command `sweep`.
+/// Arguments of `photoncard study`: the name of a built-in study, or the command `sweep` or `merge`.
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct StudyArguments {
@@ -102,6 +102,22 @@ fn symbol(text: &str) -> Result<Axis, String> {
 pub(crate) enum StudyCommand {
     /// Measure a scene of your own over any values of settings, caches and chips
     Sweep(Box<SweepArguments>),
+    /// Write the report of a study whose parts were measured by --part, from their folders; the scene must be
+    /// where the parts had it
+    Merge(StudyMergeArguments),
+}
+
+#[derive(Args)]
+pub(crate) struct StudyMergeArguments {
+    /// Folders of all parts
+    #[arg(required = true, value_name = "DIR")]
+    pub(crate) parts: Vec<PathBuf>,
+    /// The folder for reports and the points of all parts; it is made if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Show no notices
+    #[arg(long)]
+    pub(crate) quiet: bool,
 }
 
 /// Studies that a name selects.

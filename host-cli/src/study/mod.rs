@@ -1,7 +1,9 @@
 //! Command `photoncard study`.
 
+mod command;
 mod sweep;
 
+use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,25 +12,59 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use miette::MietteDiagnostic;
 use photoncard_driver::study::{
-    Provenance, StudyError, StudyObserver, StudyOptions, run as study, run_sweep,
+    Extent, Provenance, StudyError, StudyObserver, StudyOptions, SweepOptions, run as study, run_sweep, unite,
 };
 
-use crate::arguments::{StudyArguments, StudyCommand};
+use crate::arguments::{StudyArguments, StudyCommand, StudyMergeArguments};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::remaining::Remaining;
 use crate::progress::{duration, stop_on_signals};
-use crate::shell;
 
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Runs built-in studies, or a sweep, and writes their reports.
+/// Runs built-in studies or a sweep, or a part of them, or writes the report of their parts.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
-    let provenance = Provenance::here(&command_line());
+    if let Some(StudyCommand::Merge(merge)) = &arguments.own {
+        return run_merge(merge);
+    }
+    let stated = command::stated();
+    let provenance = Provenance::here(&command::line(&stated));
+    let part = match arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => sweep.output.part,
+        StudyArguments { output, .. } => output.as_ref().and_then(|output| output.part),
+    };
+    let extent = part.map_or(Extent::Whole, |part| Extent::Part { part, command: stated });
+    run_stated(arguments, &std::env::args_os().collect::<Vec<_>>(), provenance, extent)
+}
+
+/// Unites parts, and writes the report of their study.
+fn run_merge(merge: &StudyMergeArguments) -> Result<(), Failure> {
+    let union = unite(&merge.parts, &merge.out).map_err(|error| failure(error.into()))?;
+    let (words, mut arguments) = command::parse(&union.command, &merge.out)?;
+    let output = match &mut arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => Some(&mut sweep.output),
+        StudyArguments { output, .. } => output.as_mut(),
+    };
+    if let Some(output) = output {
+        (output.threads, output.quiet) = (Some(union.threads), merge.quiet);
+    }
+    let here = Provenance::here(&command::line(&union.command));
+    let provenance = Provenance { date: union.date.clone(), host: union.host.clone(), ..here };
+    run_stated(&arguments, &words, provenance, Extent::Merged(union))
+}
+
+/// Runs the studies of arguments, which are parsed from `words`.
+fn run_stated(
+    arguments: &StudyArguments,
+    words: &[OsString],
+    provenance: Provenance,
+    extent: Extent,
+) -> Result<(), Failure> {
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
-            let options = sweep::options(sweep, provenance)?;
+            let options = SweepOptions { extent, ..sweep::options(sweep, words, provenance)? };
             observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
         }
         StudyArguments { own: None, name: Some(name), output: Some(output), scenes, .. } => {
@@ -41,6 +77,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
                 is_collection: name.is_collection(),
                 threads: output.threads,
                 provenance,
+                extent,
             };
             run_shipped(&options, output.quiet)
         }
@@ -75,11 +112,6 @@ fn failure(error: StudyError) -> Failure {
         error if error.is_input() => Failure::input(error),
         error => Failure::work(error),
     }
-}
-
-/// Command line of this process, quoted; the program is named `photoncard`, without its folder.
-fn command_line() -> String {
-    shell::command(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
 }
 
 /// Progress of a study: a bar on a terminal, elsewhere a line for each tenth.

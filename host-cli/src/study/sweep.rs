@@ -10,9 +10,10 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::render::ChipModel;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::study::{
-    ALONG_CURVE, AxisError, Hardware, Point, Provenance, Sweep, SweepOptions, Task,
+    ALONG_CURVE, AxisError, Extent, Hardware, Point, Provenance, Sweep, SweepOptions, Task,
 };
 
+use super::command::end_of_options;
 use crate::arguments::{
     Arguments, CACHE, CHIP, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
 };
@@ -24,15 +25,19 @@ use crate::notices::{self, Uses};
 /// Name of a varied option, without its leading dashes, and one of the option's values.
 type Value<'a> = (&'a str, &'a str);
 
-/// Loads the scene of a sweep and creates its points.
-pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
+/// Loads the scene of a sweep and creates its points. `words` are the words of the arguments.
+pub(super) fn options(
+    arguments: &SweepArguments,
+    words: &[OsString],
+    provenance: Provenance,
+) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u64::from(u32::MAX))?;
     let name = input::name(&arguments.scene);
     let picture = arguments.point(&name, arguments.model()).settings.picture;
     notices::say_ignored(&arguments.scene, &scene, &Uses::of(&arguments.scene, &picture, None))?;
     let mut notices = BTreeSet::new();
     let sweep = Sweep::new(arguments.axes(), |values| {
-        let made = point(arguments, &values, &scene, &mut notices);
+        let made = point((arguments, words), &values, &scene, &mut notices);
         made.map_err(PointError)
     });
     let sweep = sweep.map_err(|PointError(failure)| failure)?;
@@ -46,13 +51,13 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     let provenance = Provenance { settings, ..provenance };
     let StudyOutput { out, threads, .. } = &arguments.output;
     let (out, threads) = (out.clone(), *threads);
-    Ok(SweepOptions { sweep, name, scene, out, threads, provenance })
+    Ok(SweepOptions { sweep, name, scene, out, threads, provenance, extent: Extent::Whole })
 }
 
 /// Returns the point of the sweep at which the options have these values, with its hardware, and adds notices
 /// about it to `notices`. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
-    arguments: &SweepArguments,
+    (arguments, words): (&SweepArguments, &[OsString]),
     values: &[Value],
     scene: &Scene,
     notices: &mut BTreeSet<String>,
@@ -62,7 +67,7 @@ fn point(
         others.into_iter().partition(|(name, _)| name.starts_with(CHIP));
     let (curve, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|value| *value == ("order", ALONG_CURVE));
-    let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
+    let replaced = replaced(words, &others).map_err(|error| refused(&others, &reason(&error)))?;
     let arguments = replaced.as_ref().unwrap_or(arguments);
     let model = with_capacities(arguments.model().clone(), &capacities)?;
     let mut point = arguments.point(&input::name(&arguments.scene), &model);
@@ -86,8 +91,8 @@ fn with_capacities(model: ChipModel, values: &[Value]) -> Result<ChipModel, Fail
     })
 }
 
-/// Parses this process's arguments with `values` added; `None` if there are no values.
-fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
+/// Parses the words of a sweep's arguments with `values` added; `None` if there are no values.
+fn replaced(words: &[OsString], values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     if values.is_empty() {
         return Ok(None);
     }
@@ -96,9 +101,8 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
         study.mut_subcommand("sweep", |sweep| sweep.args_override_self(true))
     });
     let added = values.iter().map(|(name, value)| format!("--{name}={value}").into());
-    let mut given: Vec<OsString> = std::env::args_os().collect();
-    // Words after `--` are no options.
-    let end = given.iter().position(|word| word == "--").unwrap_or(given.len());
+    let mut given = words.to_vec();
+    let end = end_of_options(words);
     given.splice(end..end, added);
     let matches = command.try_get_matches_from(given)?;
     match Arguments::from_arg_matches(&matches)?.command {

@@ -273,3 +273,106 @@ fn a_table_is_of_a_chip_of_a_file_and_of_stated_symbols() {
     let page = String::from_utf8(room.read("out/index.html")).unwrap();
     assert!(page.contains("emulated:chip.toml") && page.contains("1 GFLOPS"), "the provenance");
 }
+
+/// All files below a folder, by their paths in it.
+fn files(folder: &std::path::Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = std::path::PathBuf::from(path.file_name().unwrap());
+        if path.is_dir() {
+            found.extend(files(&path).into_iter().map(|(below, bytes)| (name.join(below), bytes)));
+        } else {
+            found.insert(name, std::fs::read(path).unwrap());
+        }
+    }
+    found
+}
+
+/// Runs a command of `photoncard study` without an output folder, whole and in three parts. Their union must
+/// be the whole, byte for byte.
+fn check_parts(room: &Room, study: &[&str]) {
+    let run = |own: &[&str]| {
+        let outcome = room.run(&[&["study"], study, own].concat());
+        assert_eq!(outcome.status, Some(0), "{own:?}: {}", outcome.stderr);
+    };
+    run(&["--out", "whole", "--threads", "1"]);
+    for (folder, part) in [("c", "3/3"), ("a", "1/3"), ("b", "2/3")] {
+        run(&["--part", part, "--out", folder, "--quiet", "--threads", "1"]);
+        assert!(
+            room.path(folder).join("part.json").exists() && !room.path(folder).join("index.html").exists()
+        );
+    }
+    let counts = ["a", "b", "c"].map(|part| files(&room.path(part)).len() - 1);
+    assert!(counts.iter().all(|&count| count > 0), "{counts:?}");
+    let merged = room.run(&["study", "merge", "b", "a", "c", "--out", "merged"]);
+    assert_eq!((merged.status, merged.stdout.as_str()), (Some(0), ""), "{}", merged.stderr);
+    let [whole, merged] = ["whole", "merged"].map(|folder| files(&room.path(folder)));
+    assert_eq!(whole.keys().collect::<Vec<_>>(), merged.keys().collect::<Vec<_>>());
+    for (path, bytes) in whole {
+        assert!(merged[&path] == bytes, "{}", path.display());
+    }
+}
+
+/// Sweep of [`SWEEP`] without its output.
+fn sweep_without_output() -> Vec<&'static str> {
+    SWEEP.iter().copied().filter(|word| !["--out", "out", "--quiet"].contains(word)).collect()
+}
+
+#[test]
+fn the_parts_of_a_sweep_add_up_to_the_whole() {
+    let room = room_with_a_scene();
+    let vary = ["--vary", "order=naive,sort", "--vary", "chip.gather_queue=16,64"];
+    check_parts(&room, &[&sweep_without_output()[..], &vary].concat());
+    // Each seed has a card image of its own, of which a part measures all points.
+    let room = room_with_a_scene();
+    check_parts(&room, &[&sweep_without_output()[..], &["--vary", "seed=1,2,3,4"]].concat());
+}
+
+#[test]
+fn the_parts_of_a_study_add_up_to_the_whole() {
+    let folder = shipped("");
+    check_parts(&Room::new(), &["table-7.1", "--quick", "--sample", "1/17", "--scenes", &folder]);
+}
+
+#[test]
+fn parts_that_cannot_be_united_are_refused_with_a_remedy() {
+    let room = room_with_a_scene();
+    let sweep = sweep_without_output();
+    let measure = |folder: &str, own: &[&str]| {
+        let own = [own, &["--out", folder, "--quiet"]].concat();
+        let outcome = room.run(&[&["study"], &sweep[..], &["--vary", "order=naive,sort"], &own].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    };
+    measure("a", &["--part", "1/2"]);
+    measure("b", &["--part", "2/2"]);
+    measure("seeded", &["--part", "2/2", "--seed", "7"]);
+    measure("thirds", &["--part", "2/3"]);
+    measure("whole", &[]);
+    let merge = |folders: &[&str], words: &[&str]| {
+        let outcome = room.run(&[&["study", "merge"], folders, &["--out", "merged"]].concat());
+        assert_eq!(outcome.status, Some(2), "{folders:?}: {}", outcome.stderr);
+        let said = outcome.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.iter().all(|word| said.contains(word)), "{folders:?}: {said}");
+        assert!(!room.path("merged/index.html").exists());
+    };
+    merge(&["a"], &["part 2/2", "is missing", "--part 2/2 --out DIR"]);
+    merge(&["a", "seeded"], &["a and seeded are of different studies", "--seed 7"]);
+    merge(&["a", "thirds"], &["a and thirds are of different studies", "in 3 parts"]);
+    merge(&["a", "whole"], &["whole is no finished part of a study", "part.json", "--part K/N --out whole"]);
+    merge(&["a", "absent"], &["absent is no finished part"]);
+    let record = String::from_utf8(room.read("b/part.json")).unwrap();
+    room.write("b/part.json", record.replace("photoncard 0.", "photoncard 99."));
+    merge(&["a", "b"], &["b was measured by photoncard 99.", "measure all parts with this one"]);
+    room.write("b/part.json", &record);
+    let mut other = scene();
+    other["materials"][1]["emissiveFactor"] = serde_json::json!([0.5, 0.25, 0.125]);
+    room.write_scene("my scene.gltf", &other);
+    merge(&["a", "b"], &["my scene.gltf is not the one that the parts have measured"]);
+    room.write_scene("my scene.gltf", &scene());
+    std::fs::remove_dir_all(room.path("merged")).unwrap();
+    for entry in std::fs::read_dir(room.path("b/points")).unwrap() {
+        std::fs::remove_file(entry.unwrap().path()).unwrap();
+    }
+    merge(&["a", "b"], &["of part 2/2 is missing", "measure the part again"]);
+}
