@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{MappedImage, check_image, check_packed, map_photons};
 use photoncard_render::RenderError;
+use photoncard_render::emulator::direct::TileMemory;
 use photoncard_render::parts::Part;
 use photoncard_scene::{Scene, gltf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -272,8 +273,9 @@ impl<'a> Laboratory<'a> {
             Task::Traffic { caches, .. } if point.is_along_curve => {
                 Outcome::Traffic(bench.along_curve(&point.settings, caches)?)
             }
-            Task::Traffic { chip, caches, sample, least_tiles } => {
-                Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
+            Task::Traffic { chip, caches, sample, least_tiles, has_reuse } => {
+                let model = TileMemory { caches, has_reuse: *has_reuse };
+                Outcome::Traffic(bench.traffic(&point.settings, *chip, model, *sample, *least_tiles)?)
             }
             &Task::Quality { tiles, reference_rays } => {
                 let known = self.reference.take().filter(|known| known.is_of(point, tiles, reference_rays));

@@ -200,7 +200,7 @@ impl Scale {
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
         let chip = self.chip();
         let (sample, least_tiles) = (self.sample, self.least_tiles);
-        let task = Task::Traffic { chip, caches, sample, least_tiles };
+        let task = Task::Traffic { chip, caches, sample, least_tiles, has_reuse: false };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
@@ -214,7 +214,7 @@ impl Scale {
         caches: CacheSettings,
     ) -> Point {
         let (sample, least_tiles) = (SampleRate::ALL, self.least_tiles);
-        let task = Task::Traffic { chip, caches, sample, least_tiles };
+        let task = Task::Traffic { chip, caches, sample, least_tiles, has_reuse: false };
         Point { task, ..self.traffic_behind(scene, settings, caches) }
     }
 

@@ -9,12 +9,13 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::Machine;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::parts::Part;
 use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{
-    Axis, AxisError, Extent, Hardware, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study,
-    StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Extent, Hardware, Laboratory, Point, Provenance, Quality, RECORD, SampleRate, Scale,
+    Study, StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep, unite,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -167,6 +168,42 @@ fn a_stopped_study_goes_on_where_it_stopped() {
         fs::read(folder.path().join("orders.csv")).unwrap(),
         fs::read(other.path().join("orders.csv")).unwrap()
     );
+}
+
+/// The union of parts is the whole, byte for byte, but for the times of the host's work, which no two runs
+/// share.
+#[test]
+fn parts_of_studies_add_up_to_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |name: &str, extent: Extent| {
+        let scale = Scale { side: 24, gather_rays: 4, ..tiny() };
+        let studies = [Study::Table71, Study::Interactive];
+        StudyOptions { scale, extent, ..options(&folder.path().join(name), &studies) }
+    };
+    let all = Counting::up_to(usize::MAX);
+    run(&of("whole", Extent::Whole), &all).unwrap();
+    let parts: Vec<_> = (1..=3).map(|number| folder.path().join(number.to_string())).collect();
+    for (part, path) in Part::all(3).zip(&parts) {
+        let command = vec!["study".to_owned()];
+        run(&of(&part.number().to_string(), Extent::Part { part, command }), &all).unwrap();
+        let names: Vec<_> =
+            files(path).into_keys().map(|file| file.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, [RECORD], "a part writes no report");
+    }
+    let united = unite(&parts, &folder.path().join("merged")).unwrap();
+    let none = Counting::up_to(usize::MAX);
+    run(&of("merged", Extent::Merged(united.clone())), &none).unwrap();
+    assert_eq!(none.measured(), 0);
+    let [whole, merged] = ["whole/table-7.1", "merged/table-7.1"].map(|name| folder.path().join(name));
+    let names = |root: &Path| -> Vec<_> {
+        files(root).into_iter().map(|(path, bytes)| (path.file_name().unwrap().to_owned(), bytes)).collect()
+    };
+    assert!(names(&whole) == names(&merged) && !names(&whole).is_empty());
+    assert!(folder.path().join("merged/interactive/host.csv").exists());
+    // The host's work is a point of the first part.
+    fs::remove_dir_all(folder.path().join("merged")).unwrap();
+    let error = run(&of("merged", Extent::Merged(united)), &none).unwrap_err();
+    assert!(error.is_input() && error.to_string().contains("is missing"), "{error}");
 }
 
 #[test]
@@ -340,7 +377,7 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
     let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
     let on = |chip, settings| {
         let (caches, sample) = (CacheSettings::default(), SampleRate::ALL);
-        let task = Task::Traffic { chip, caches, sample, least_tiles: 1 };
+        let task = Task::Traffic { chip, caches, sample, least_tiles: 1, has_reuse: false };
         Point { task, ..tiny().traffic("cornell.gltf", settings) }
     };
     let sorted = tiny().settings(GatherOrder::Sort).with(|s| s.integrator.gather_rays = 32);

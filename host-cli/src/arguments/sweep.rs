@@ -34,6 +34,10 @@ pub(crate) struct SweepArguments {
         )
     )]
     pub(crate) vary: Vec<Axis>,
+    /// Count distances between reads of a cache line, and compulsory, capacity and conflict misses, by
+    /// structure: reuse.csv and reuse-distances.csv. It takes time
+    #[arg(long)]
+    reuse: bool,
     #[command(flatten)]
     pub(crate) output: StudyOutput,
     #[command(flatten)]
@@ -111,6 +115,7 @@ impl SweepArguments {
             caches: caches.first().copied().unwrap_or_else(|| model.caches()),
             sample: self.output.sample,
             least_tiles: Scale::FULL.least_tiles,
+            has_reuse: self.reuse,
         };
         let (scene, assignments) = (name.to_owned(), self.scene.assignments.clone());
         Point { scene, assignments, settings, is_along_curve: false, task }

@@ -330,12 +330,6 @@ fn the_parts_of_a_sweep_add_up_to_the_whole() {
 }
 
 #[test]
-fn the_parts_of_a_study_add_up_to_the_whole() {
-    let folder = shipped("");
-    check_parts(&Room::new(), &["table-7.1", "--quick", "--sample", "1/17", "--scenes", &folder]);
-}
-
-#[test]
 fn parts_that_cannot_be_united_are_refused_with_a_remedy() {
     let room = room_with_a_scene();
     let sweep = sweep_without_output();
@@ -375,4 +369,45 @@ fn parts_that_cannot_be_united_are_refused_with_a_remedy() {
         std::fs::remove_file(entry.unwrap().path()).unwrap();
     }
     merge(&["a", "b"], &["of part 2/2 is missing", "measure the part again"]);
+}
+
+/// Classes of misses add up to the misses of the caches, and histograms to the requests, of each structure.
+#[test]
+fn the_reuse_of_a_sweep_adds_up_to_its_reads() {
+    let room = room_with_a_scene();
+    let own = ["--reuse", "--sample", "1", "--cache", "photon=1K/128/1,scene=1K/128/1"];
+    for order in ["order=naive,sort", "in-flight=1,2;order=sort"] {
+        let vary: Vec<_> = order.split(';').flat_map(|axis| ["--vary", axis]).collect();
+        let outcome =
+            room.run(&[&["study"], &SWEEP[..], &own, &vary, &["--card", "emulated-large"]].concat());
+        assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+        let read = |name: &str| -> Vec<serde_json::Value> {
+            serde_json::from_slice(&room.read(&format!("out/{name}.json"))).unwrap()
+        };
+        let (structures, classes, distances) = (read("structures"), read("reuse"), read("reuse-distances"));
+        let number = |row: &serde_json::Value, column: &str| (1e6 * row[column].as_f64().unwrap()).round();
+        assert!(structures.len() >= 8 && classes.len() == structures.len(), "{classes:?}");
+        for (structure, classes) in structures.iter().zip(&classes) {
+            assert_eq!(structure["structure"], classes["structure"]);
+            let misses = number(classes, "misses (million)");
+            // Each miss reads a line of 128 bytes.
+            let bytes = (1e9 * structure["from DRAM (GB)"].as_f64().unwrap()).round();
+            assert_eq!(128.0 * misses, bytes, "{structure}");
+            let parts = ["compulsory", "capacity", "conflict"]
+                .map(|class| number(classes, &format!("{class} (million)")));
+            assert_eq!(parts.iter().sum::<f64>(), misses, "{classes}");
+            let is_of = |row: &&serde_json::Value| {
+                ["order", "in-flight", "structure"].iter().all(|column| row[*column] == classes[*column])
+            };
+            let again: f64 = distances.iter().filter(is_of).map(|row| number(row, "reads (million)")).sum();
+            assert_eq!(again + parts[0], number(structure, "requests (million)"), "{classes}");
+        }
+        assert!(
+            classes.iter().any(|row| number(row, "conflict (million)") != 0.0),
+            "caches of one way conflict"
+        );
+    }
+    let curve = room.run(&[&["study"], &SWEEP[..], &["--reuse", "--vary", "order=hilbert"]].concat());
+    assert_eq!(curve.status, Some(2), "{}", curve.stderr);
+    assert!(curve.stderr.contains("--order hilbert") && curve.stderr.contains("reuse"), "{}", curve.stderr);
 }

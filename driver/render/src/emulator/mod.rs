@@ -7,6 +7,7 @@ mod dram;
 mod emulated;
 mod measured;
 pub mod memory_model;
+pub mod reuse;
 mod tile_lines;
 pub mod trace;
 mod traced;

@@ -52,6 +52,12 @@ pub(crate) enum Block {
         name: String,
         table: Table,
     },
+    /// A table of files alone, to which the page links.
+    Data {
+        /// Name of the files without their extensions.
+        name: String,
+        table: Table,
+    },
     /// A plot. It is also stored in the file `<name>.svg` beside the page.
     Plot {
         /// Name of the file without its extension.
@@ -121,7 +127,7 @@ impl Block {
     pub(super) fn files(&self) -> Vec<(String, String)> {
         match self {
             Self::Paragraph(_) | Self::Link { .. } => Vec::new(),
-            Self::Table { name, table } => {
+            Self::Table { name, table } | Self::Data { name, table } => {
                 let json = table.is_data().then(|| (format!("{name}.json"), table.to_json()));
                 std::iter::once((format!("{name}.csv"), table.to_csv())).chain(json).collect()
             }
@@ -135,6 +141,7 @@ impl Block {
             Self::Link { text, target } => {
                 format!("<p><a href=\"{}\">{}</a></p>\n", escape(target), escape(text))
             }
+            Self::Data { name, table } => format!("<p>{}</p>\n", caption(name, table)),
             Self::Table { name, table } => {
                 format!(
                     "<figure>\n<figcaption>{}</figcaption>\n{}</figure>\n",

@@ -73,7 +73,7 @@ pub enum ReportError {
 pub(crate) fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {
-        if let Block::Table { name, .. } | Block::Plot { name, .. } = block
+        if let Block::Table { name, .. } | Block::Data { name, .. } | Block::Plot { name, .. } = block
             && !is_portable(name)
         {
             return Err(ReportError::BadName { name: name.clone() });

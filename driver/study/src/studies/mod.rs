@@ -162,6 +162,7 @@ mod tests {
             reads,
             waiting_written_bytes: 0,
             contents: Contents::ZERO,
+            reuse: None,
         };
         let error = TileDeviation { pixels: 256, squares: 7.0, noise: 0.5, sum: 760.0, reference: 768.0 };
         let outcome = |point: &Point| match point.task {

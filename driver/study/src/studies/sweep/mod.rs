@@ -1,13 +1,17 @@
 //! Sweep: a study of a user's scene, over any settings of the render and of the chip.
 
 mod report;
+mod reuse;
+mod swept;
 
 use std::collections::BTreeSet;
 
-use photoncard_render::ChipModel;
-use photoncard_render::cost_model::{Energy, Machine};
+use photoncard_render::cost_model::Energy;
 use serde_json::Value;
 
+pub use self::swept::Hardware;
+use self::swept::Swept;
+pub(crate) use self::swept::SweptScene;
 use super::super::axes::{Axes, Axis, AxisError};
 use super::super::laboratory::Results;
 use super::super::point::{Point, Task};
@@ -22,31 +26,6 @@ pub struct Sweep {
     points: Vec<Point>,
     /// Hardware of each point.
     hardware: Vec<Hardware>,
-}
-
-/// Hardware on which a point of a sweep is computed to run. No measurement depends on it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Hardware {
-    /// Name of the chip, as the option `--card` takes it.
-    pub chip: String,
-    /// Machine for which times are computed.
-    pub machine: Machine,
-    /// Energies and area of the chip's parts.
-    pub energy: Energy,
-}
-
-impl Hardware {
-    /// Chips of a model, whose times are those of `machine`.
-    pub fn new(model: &ChipModel, machine: Machine) -> Self {
-        Self { chip: model.to_string(), machine, energy: model.energy() }
-    }
-}
-
-/// Scene of a sweep in each row of its files.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SweptScene<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) checksum: &'a str,
 }
 
 impl Sweep {
@@ -77,7 +56,8 @@ impl Sweep {
     /// # Panics
     /// If `results` lack one of the points.
     pub(crate) fn report(&self, scene: SweptScene, results: &Results) -> Report {
-        report::report(scene, self, results)
+        let Self { axes, points, hardware } = self;
+        report::report(&Swept { scene, axes, points, hardware, results })
     }
 
     /// Names and values of the points' settings, for a report's provenance. The value of a setting in which

@@ -2,24 +2,22 @@
 //! over each axis.
 
 use photoncard_picture::choice::Choice;
-use photoncard_render::PROGRAM;
 use photoncard_render::cost_model::{Cost, Prediction};
 use photoncard_render::emulator::memory_model::CacheSettings;
 use photoncard_shared::address::Structure;
-use photoncard_shared::image::LAYOUT_VERSION;
 
-use super::super::super::axes::{Axes, Axis};
-use super::super::super::laboratory::Results;
+use super::super::super::axes::Axis;
 use super::super::super::measure::Measurement;
 use super::super::super::point::{Point, Task};
-use super::super::super::report::{self, Block, Cell, Column, Report, Series, Table, XScale, YScale, slug};
+use super::super::super::report::{self, Block, Cell, Report, Series, Table, XScale, YScale, slug};
 use super::super::super::sample::Estimate;
 use super::super::arithmetic;
 use super::super::present::{
-    cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
+    cell, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
 };
 use super::super::workload::{of_frame, symbols};
-use super::{Hardware, Sweep, SweptScene};
+use super::reuse;
+use super::swept::{Hardware, Swept};
 
 /// Maximum number of lines in a plot.
 const MAX_LINES: usize = 8;
@@ -27,23 +25,14 @@ const MAX_LINES: usize = 8;
 /// Frame rate for which chips are counted.
 const RATE: f64 = 30.0;
 
-struct Swept<'a> {
-    scene: SweptScene<'a>,
-    axes: &'a Axes,
-    points: &'a [Point],
-    hardware: &'a [Hardware],
-    results: &'a Results,
-}
-
-pub(super) fn report(scene: SweptScene, sweep: &Sweep, results: &Results) -> Report {
-    let Sweep { axes, points, hardware } = sweep;
-    let swept = Swept { scene, axes, points, hardware, results };
+pub(super) fn report(swept: &Swept) -> Report {
+    let Swept { axes, hardware, .. } = *swept;
     let machine = &hardware[0].machine;
     let chip = match hardware.iter().all(|other| other.machine == *machine) {
         true => machine.to_string(),
         false => "the rates of its row".to_owned(),
     };
-    let scene = scene.name;
+    let scene = swept.scene.name;
     let introduction = vec![
         format!("Work and memory traffic of {scene} in frames that differ in the settings below."),
         how_it_counts(),
@@ -61,47 +50,11 @@ pub(super) fn report(scene: SweptScene, sweep: &Sweep, results: &Results) -> Rep
         ));
     }
     sections.push(section("Structures", vec![table("structures", swept.structures())]));
+    sections.extend(reuse::section_of(swept));
     page(&format!("Sweep of {scene}"), introduction, sections)
 }
 
 impl Swept<'_> {
-    fn measured(&self, indices: &[usize]) -> &Measurement {
-        self.results.traffic(&self.points[self.axes.point(indices)])
-    }
-
-    /// Columns of the axes, followed by `others`.
-    fn heads(&self, others: &[(&str, &str)]) -> Vec<Column> {
-        let axes = self.axes.list().iter().map(|axis| Column::new(axis.name.as_str(), ""));
-        axes.chain(columns(others)).collect()
-    }
-
-    /// Cells with the values of a combination. All cells of an axis are numbers, or all are texts.
-    fn values(&self, indices: &[usize]) -> Vec<Cell> {
-        let axes = self.axes.list().iter().zip(indices);
-        axes.map(|(Axis { values, .. }, &index)| typed(values, index)).collect()
-    }
-
-    /// Adds what identifies each row without the page to the files of a table, whose rows are `rows` for each
-    /// point. A column whose name is that of an axis is left out: the axis has it.
-    fn identify(&self, table: &mut Table, rows: usize) {
-        type Of = fn(&SweptScene, &Point, &Hardware) -> Cell;
-        let columns: [(&str, Of); 7] = [
-            ("scene", |scene, _, _| scene.name.into()),
-            ("scene-checksum", |scene, _, _| scene.checksum.into()),
-            ("seed", |_, point, _| point.settings.integrator.seed.into()),
-            ("photons", |_, point, _| point.settings.photons.count.into()),
-            ("chip", |_, _, hardware| hardware.chip.as_str().into()),
-            ("program", |_, _, _| PROGRAM.into()),
-            ("card-image-layout", |_, _, _| LAYOUT_VERSION.into()),
-        ];
-        let is_axis = |name: &str| self.axes.list().iter().any(|axis| axis.name == name);
-        for (name, of) in columns.into_iter().filter(|(name, _)| !is_axis(name)) {
-            let points = self.points.iter().zip(self.hardware);
-            let cells = points.flat_map(|(point, hardware)| vec![of(&self.scene, point, hardware); rows]);
-            table.add_to_files(Column::new(name, ""), cells.collect());
-        }
-    }
-
     /// Table with a row for each point.
     fn totals(&self) -> Table {
         let heads = self.heads(&[
@@ -276,13 +229,6 @@ impl Swept<'_> {
         }
         (varied, kept)
     }
-
-    /// Caption with the values of the axes that keep their first value.
-    fn caption(&self, kept: &[usize]) -> String {
-        let axes = kept.iter().map(|&axis| &self.axes.list()[axis]);
-        let values: Vec<_> = axes.map(|axis| format!("{} {}", axis.name, axis.values[0])).collect();
-        if values.is_empty() { String::new() } else { format!("With {}.", values.join(", ")) }
-    }
 }
 
 /// Horizontal positions of the values: the values if all are positive numbers or sizes, otherwise their
@@ -310,20 +256,6 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
         (value > 0.0 && value.is_finite()).then_some(value)
     };
     axis.values.iter().map(number).collect()
-}
-
-/// Cell with the value of an axis at an index: a number if all of its values are numbers.
-fn typed(values: &[String], index: usize) -> Cell {
-    let value = &values[index];
-    if values.iter().all(|value| value.parse::<i64>().is_ok()) {
-        return value.parse::<i64>().ok().into();
-    }
-    let number = |value: &String| value.parse::<f64>().ok().filter(|number| number.is_finite());
-    if values.iter().all(|value| number(value).is_some()) {
-        number(value).into()
-    } else {
-        value.as_str().into()
-    }
 }
 
 /// What a frame demands of the hardware.
@@ -371,21 +303,4 @@ fn cache_traffic(point: &Point, measured: &Measurement) -> [(f64, f64); 2] {
         measured.total(|tile| (tile.photon_map().raw_bytes + tile.photon_map().dram_bytes) as f64);
     let scene = measured.total(|tile| (tile.scene().raw_bytes + tile.scene().dram_bytes) as f64);
     [(photon_map.value, f64::from(sizes[0])), (scene.value, f64::from(sizes[1]))]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_values_of_an_axis_are_all_numbers_or_all_texts() {
-        let all = |values: &[&str]| {
-            let values: Vec<_> = values.iter().map(|&value| value.to_owned()).collect();
-            (0..values.len()).map(|index| typed(&values, index)).collect::<Vec<_>>()
-        };
-        assert_eq!(all(&["1", "-2"]), [Cell::Integer(1), Cell::Integer(-2)]);
-        assert_eq!(all(&["1", "0.50"]), [Cell::from(1.0), Cell::from(0.5)]);
-        assert_eq!(all(&["1", "auto"]), [Cell::from("1"), Cell::from("auto")]);
-        assert_eq!(all(&["inf", "1"]), [Cell::from("inf"), Cell::from("1")]);
-    }
 }
