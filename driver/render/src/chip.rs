@@ -83,8 +83,8 @@ impl ChipModel {
     /// Reads the chip of a TOML file.
     ///
     /// # Errors
-    /// If the file cannot be read, is no TOML, or has a key that is unknown, of another type, out of its range
-    /// or in contradiction to others.
+    /// If the file cannot be read, is no TOML, or has a key that is unknown, of another type, out of its
+    /// range or in contradiction to others.
     pub fn read(path: &Path) -> Result<Self, ChipFileError> {
         let mut text = String::new();
         let read = File::open(path).and_then(|file| file.take(MAX_BYTES).read_to_string(&mut text));

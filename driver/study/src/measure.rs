@@ -166,8 +166,8 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders `tiles` on chips of the kind `chip`. If `model` is given, the memory is modelled with its caches,
-    /// which are empty when a tile begins.
+    /// Renders `tiles` on chips of the kind `chip`. If `model` is given, the memory is modelled with its
+    /// caches, which are empty when a tile begins.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.

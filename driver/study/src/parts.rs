@@ -257,9 +257,9 @@ fn copy(from: &Path, to: &Path) -> Result<Result<(), StoreError>, String> {
     Ok(Ok(()))
 }
 
-/// Deals points to `count` parts: the number of each point's part, from 1. If there are as many card images as
-/// parts, all points of an image are in one part, so that its photons are traced once; otherwise neighbouring
-/// points are in different parts, so that all parts take about the same time.
+/// Deals points to `count` parts: the number of each point's part, from 1. If there are as many card images
+/// as parts, all points of an image are in one part, so that its photons are traced once; otherwise
+/// neighbouring points are in different parts, so that all parts take about the same time.
 pub(crate) fn deal(points: &[Point], count: u32) -> Vec<u32> {
     let mut images: Vec<ImageKey> = Vec::new();
     let image_of: Vec<usize> = points

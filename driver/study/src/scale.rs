@@ -108,8 +108,8 @@ impl Scale {
         self.chip().budget().tile_pixels.isqrt()
     }
 
-    /// Text that marks figures as those of a trial, or of another chip than the reference chip; `None` for the
-    /// settings of the nominal frame.
+    /// Text that marks figures as those of a trial, or of another chip than the reference chip; `None` for
+    /// the settings of the nominal frame.
     pub fn banner(&self) -> Option<String> {
         let of_trial = self.trial();
         let of_chip = self.model.as_ref().map(|model| {

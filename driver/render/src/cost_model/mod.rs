@@ -5,7 +5,8 @@
 //! frame. A [`Cost`] is the number of FLOPs and DRAM bytes of this work in each unit of the chip. A
 //! [`Prediction`] is the speed of a [`Machine`] at such a cost. [`Flops`] are the operations of a measured
 //! run by the constants of Table 7.1; [`arithmetic`] counts those of this firmware. A [`Distribution`] gives
-//! the time of an upload to all chips, and [`Energy`] the energy of a frame. `docs/scaling.md` has the formulas.
+//! the time of an upload to all chips, and [`Energy`] the energy of a frame. `docs/scaling.md` has the
+//! formulas.
 
 pub mod arithmetic;
 mod distribution;

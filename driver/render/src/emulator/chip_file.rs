@@ -151,8 +151,8 @@ impl fmt::Display for SramParts {
 }
 
 impl Emulated {
-    /// Replaces the stated capacities. But no block waits, unless it is stated, if the capacities have no room
-    /// for it.
+    /// Replaces the stated capacities. But no block waits, unless it is stated, if the capacities have no
+    /// room for it.
     ///
     /// # Errors
     /// The first capacity that is unknown, out of its range or contradicts others.

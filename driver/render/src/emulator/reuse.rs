@@ -1,4 +1,5 @@
-//! Reuse of cache lines: distances between reads of one line, and the classes of misses that follow from them.
+//! Reuse of cache lines: distances between reads of one line, and the classes of misses that follow from
+//! them.
 //!
 //! The reuse distance of a read is the number of other lines that were read through the same cache since the
 //! last read of its line: the stack distance of R. Mattson et al. (1970), counted by the method of B. Bennett

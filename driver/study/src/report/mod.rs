@@ -64,8 +64,8 @@ pub enum ReportError {
 }
 
 /// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, data as
-/// `<name>.json` too, each plot as `<name>.svg`, and finally `index.html`. Existing files with these names are replaced, each atomically;
-/// other files are left unchanged.
+/// `<name>.json` too, each plot as `<name>.svg`, and finally `index.html`. Existing files with these names
+/// are replaced, each atomically; other files are left unchanged.
 ///
 /// # Errors
 /// If a name has other characters than letters, digits, `-` and `.`, or two files would have names that are

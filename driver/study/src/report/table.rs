@@ -202,8 +202,8 @@ impl Table {
         csv_of(&records).unwrap_or_default()
     }
 
-    /// Encodes the rows of [`Self::to_csv`] as a JSON array of objects. A key is the head of a column. Numbers
-    /// are numbers; cells without a value, and values that are not finite, are `null`.
+    /// Encodes the rows of [`Self::to_csv`] as a JSON array of objects. A key is the head of a column.
+    /// Numbers are numbers; cells without a value, and values that are not finite, are `null`.
     pub(crate) fn to_json(&self) -> String {
         let header = self.header();
         let object = |record: Vec<Cell>| -> Map<String, Value> {
