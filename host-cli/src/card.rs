@@ -22,7 +22,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;
     let kind = match address {
-        CardAddress::Emulated { kind, .. } => Some(*kind),
+        CardAddress::Emulated { model, .. } => Some(model.kind()),
         CardAddress::Remote(_) => None,
     };
     let mut lines = vec![
@@ -224,7 +224,7 @@ pub(crate) fn emulate(options: &EmulateOptions) -> Result<(), Failure> {
         ));
     }
     print(&[listener.card_address().to_owned()])?;
-    let kind = options.chip.or(options.card).emulated();
+    let kind = options.card.model.kind().emulated();
     let chip = options.card_memory.map_or(kind, |bytes| kind.with_memory(bytes));
     serve_card(chip, &mut HostPort::new(listener, stop, say)).map_err(|error| Failure::work_error(&error))?;
     Err(Failure::Stopped("stopped; the card is gone"))

@@ -74,9 +74,7 @@ pub fn main() -> ExitCode {
         Command::Tonemap(options) => pictures::tonemap(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
         Command::Card(CardCommand::List) => card::list(),
-        Command::Card(CardCommand::Info { card, chip }) => {
-            card::info(&card.clone().of_kind(|kind| chip.or(kind)))
-        }
+        Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
         Command::Card(CardCommand::Selftest { card, quiet }) => card::self_test(card, *quiet),
         Command::Emulate(options) => card::emulate(options),

@@ -8,15 +8,16 @@ use photoncard_cards::link::RemoteAddress;
 use photoncard_picture::choice::Choice;
 
 use super::RenderError;
+use crate::chip::{ChipModel, FILE_FORM, is_file};
 use crate::emulator::EmulatedKind;
 
 /// Address of one card, or of several emulated cards: an element of `cards.addresses`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum CardAddress {
     /// Emulated chips in this process.
     Emulated {
-        /// Kind of the chips.
-        kind: EmulatedKind,
+        /// Model of the chips.
+        model: ChipModel,
         /// Number of chips.
         chips: usize,
         /// Memory of each card, bytes.
@@ -33,36 +34,27 @@ const MAX_CHIPS: usize = 1024;
 impl Default for CardAddress {
     /// One emulated reference chip.
     fn default() -> Self {
-        Self::chips(EmulatedKind::Reference, 1)
+        Self::chips(EmulatedKind::Reference.into(), 1)
     }
 }
 
 impl CardAddress {
-    /// Emulated chips of a kind in this process, one per processor core.
-    pub fn emulated(kind: EmulatedKind) -> Self {
-        Self::chips(kind, std::thread::available_parallelism().map_or(1, usize::from))
+    /// Emulated chips of a model in this process, one per processor core.
+    pub fn emulated(model: impl Into<ChipModel>) -> Self {
+        Self::chips(model.into(), std::thread::available_parallelism().map_or(1, usize::from))
     }
 
-    /// Emulated chips of a kind in this process, each with the memory of its kind.
-    fn chips(kind: EmulatedKind, chips: usize) -> Self {
-        Self::Emulated { kind, chips, memory: kind.budget().dram_bytes }
-    }
-
-    /// Applies `change` to the kind of emulated chips, and sets their memory to the memory of the new kind.
-    /// The address of a remote card does not change.
-    #[must_use]
-    pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
-        match self {
-            Self::Emulated { kind, chips, .. } => Self::chips(change(kind), chips),
-            remote @ Self::Remote(_) => remote,
-        }
+    /// Emulated chips of a model in this process, each with the memory of its kind.
+    fn chips(model: ChipModel, chips: usize) -> Self {
+        let memory = model.kind().budget().dram_bytes;
+        Self::Emulated { model, chips, memory }
     }
 
     /// Replaces the memory of emulated cards by `bytes`. The address of a remote card does not change.
     #[must_use]
     pub fn with_memory(self, bytes: u64) -> Self {
         match self {
-            Self::Emulated { kind, chips, .. } => Self::Emulated { kind, chips, memory: bytes },
+            Self::Emulated { model, chips, .. } => Self::Emulated { model, chips, memory: bytes },
             remote @ Self::Remote(_) => remote,
         }
     }
@@ -76,7 +68,7 @@ impl CardAddress {
     pub fn forms() -> String {
         let emulated: String =
             EmulatedKind::ALL.iter().map(|kind| format!("{}[:CHIPS], ", kind.name())).collect();
-        format!("{emulated}{}", RemoteAddress::FORMS)
+        format!("{emulated}{FILE_FORM}[:CHIPS], {}", RemoteAddress::FORMS)
     }
 
     /// Number of chips at this address that this process emulates.
@@ -135,7 +127,7 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Emulated { kind, chips, .. } => write!(f, "{}:{chips}", kind.name()),
+            Self::Emulated { model, chips, .. } => write!(f, "{model}:{chips}"),
             Self::Remote(address) => address.fmt(f),
         }
     }
@@ -155,11 +147,22 @@ impl FromStr for CardAddress {
     }
 }
 
-fn emulated(kind: EmulatedKind, chips: Option<&str>) -> Result<CardAddress, String> {
-    let Some(text) = chips else { return Ok(CardAddress::emulated(kind)) };
+/// Emulated chips of a kind, or of the file at the begin of `rest`.
+fn emulated(kind: EmulatedKind, rest: Option<&str>) -> Result<CardAddress, String> {
+    let Some(rest) = rest else { return Ok(CardAddress::emulated(kind)) };
+    let (file, chips) = match rest.rsplit_once(':') {
+        _ if is_file(rest) => (Some(rest), None),
+        Some((file, chips)) if is_file(file) => (Some(file), Some(chips)),
+        _ => (None, Some(rest)),
+    };
+    let model = match file {
+        Some(file) => format!("{}:{file}", kind.name()).parse()?,
+        None => ChipModel::from(kind),
+    };
+    let Some(text) = chips else { return Ok(CardAddress::emulated(model)) };
     let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
     let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;
-    Ok(CardAddress::chips(kind, chips))
+    Ok(CardAddress::chips(model, chips))
 }
 
 #[cfg(test)]
@@ -182,6 +185,28 @@ mod tests {
             let address: CardAddress = text.parse().unwrap();
             assert_eq!(address.to_string(), full);
             assert_eq!(full.parse(), Ok(address));
+        }
+    }
+
+    #[test]
+    fn the_address_of_a_chip_of_a_file_is_read_as_it_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a: chip.toml");
+        std::fs::write(&path, "[memory]\ndram_bytes = 67108864\n").unwrap();
+        let text = format!("emulated:{}", path.display());
+        let address: CardAddress = format!("{text}:3").parse().unwrap();
+        assert_eq!((address.emulated_chips(), address.dram_bytes()), (3, 64 << 20));
+        assert_eq!(address.to_string(), format!("{text}:3"));
+        assert_eq!(address.to_string().parse(), Ok(address));
+        assert!(matches!(text.parse(), Ok(CardAddress::Emulated { .. })));
+        for (wrong, said) in [
+            ("emulated:absent.toml", "absent.toml cannot be read"),
+            ("emulated:absent.toml:2", "absent.toml cannot be read"),
+            ("emulated-large:absent.toml", "emulated:CHIP.toml"),
+            (&format!("{text}:0"), "1 to 1024"),
+        ] {
+            let error = wrong.parse::<CardAddress>().unwrap_err();
+            assert!(error.contains(said), "{wrong}: {error}");
         }
     }
 

@@ -8,6 +8,7 @@
 mod address;
 mod card_thread;
 mod cards;
+mod chip;
 pub mod cost_model;
 mod crew;
 pub mod display;
@@ -32,6 +33,7 @@ mod statistics;
 mod work;
 
 pub use address::CardAddress;
+pub use chip::{ChipFileError, ChipModel};
 pub use error::{CardError, RenderError};
 pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};

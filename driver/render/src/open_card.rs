@@ -44,8 +44,8 @@ impl OpenCard {
         faults: Option<LineFaults>,
     ) -> Result<Self, CardError> {
         let connection = match address {
-            &CardAddress::Emulated { kind, memory, .. } => Connection::Emulated(
-                EmulatedCard::start(kind.emulated().with_memory(memory), model, shared.clone())
+            CardAddress::Emulated { model: chip, memory, .. } => Connection::Emulated(
+                EmulatedCard::start(chip.kind().emulated().with_memory(*memory), model, shared.clone())
                     .map_err(CardError::Start)?,
             ),
             CardAddress::Remote(address) => {

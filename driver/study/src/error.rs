@@ -6,6 +6,7 @@ use photoncard_render::RenderError;
 use photoncard_scene::error::SceneError;
 
 use super::axes::AxisError;
+use super::parts::PartError;
 use super::report::ReportError;
 use super::store::StoreError;
 
@@ -31,6 +32,10 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Axes(#[from] AxisError),
+    /// Parts cannot be united.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Part(#[from] PartError),
     /// A point cannot be measured.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -61,6 +66,7 @@ impl StudyError {
             | Self::Scene(_)
             | Self::Axes(_)
             | Self::Store(StoreError::Folder { .. }) => true,
+            Self::Part(error) => !matches!(error, PartError::Store(_)),
             Self::Render(error) => error.is_input(),
             Self::Store(_) | Self::Report(_) | Self::Threads(_) | Self::Stopped => false,
         }

@@ -11,6 +11,7 @@ use photoncard_shared::image::LAYOUT_VERSION;
 
 use super::error::StudyError;
 use super::laboratory::Laboratory;
+use super::point::Point;
 use super::report::{FIGURES, Figure, ReportError, figures_csv, slug};
 use super::scale::Scale;
 
@@ -19,6 +20,16 @@ const SCENE: &str = "cornell.gltf";
 /// Scale of [`check`]. At this scale the check takes about a second.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
+/// Orders of the measurements of [`check`].
+const ORDERS: [GatherOrder; 2] = [GatherOrder::Naive, GatherOrder::Sort];
+/// Name of the measurements of [`check`].
+pub(super) const CHECK: &str = "check";
+
+/// Points of [`check`].
+pub(super) fn check_points() -> [Point; 2] {
+    ORDERS.map(|order| SCALE.whole(SCENE, SCALE.settings(order)))
+}
+
 /// Measures figures that identify the program: the versions of program and card image layout, and the exact
 /// number of bytes that two small renders fetch from DRAM. If these figures differ between two files,
 /// different versions of the program made the files.
@@ -26,14 +37,13 @@ const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale
 /// # Errors
 /// If the scene is missing, or a point cannot be measured or stored.
 pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
-    let orders = [GatherOrder::Naive, GatherOrder::Sort];
-    let points = orders.map(|order| SCALE.whole(SCENE, SCALE.settings(order)));
-    let results = laboratory.measure("check", &points)?;
+    let points = check_points();
+    let results = laboratory.measure(CHECK, &points)?;
     let mut figures = vec![
         Figure::new("program", "", PROGRAM, ""),
         Figure::new("card-image-layout", "", LAYOUT_VERSION, ""),
     ];
-    for (order, point) in orders.iter().zip(&points) {
+    for (order, point) in ORDERS.iter().zip(&points) {
         let bytes = |of: fn(&_) -> _| results.traffic(point).tiles.iter().map(of).sum::<u64>();
         let both = [
             ("photon-map", bytes(|tile: &super::TileMeasurement| tile.photon_map().dram_bytes)),

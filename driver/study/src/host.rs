@@ -19,6 +19,7 @@ use serde_json::json;
 
 use super::error::StudyError;
 use super::laboratory::{StudyObserver, load_scene};
+use super::parts::PartError;
 use super::point::identity;
 use super::store::PointStore;
 
@@ -80,6 +81,8 @@ pub(crate) struct HostBench<'a> {
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
+    /// True to refuse what is not in the store.
+    is_united: bool,
 }
 
 impl<'a> HostBench<'a> {
@@ -94,7 +97,18 @@ impl<'a> HostBench<'a> {
         observer: &'a dyn StudyObserver,
     ) -> Result<Self, StudyError> {
         let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build()?;
-        Ok(Self { scenes: scenes.to_owned(), store: PointStore::open(folder)?, pool, observer })
+        Ok(Self {
+            scenes: scenes.to_owned(),
+            store: PointStore::open(folder)?,
+            pool,
+            observer,
+            is_united: false,
+        })
+    }
+
+    /// Refuses results that are not in the store, which has those of the first part.
+    pub(crate) fn refuse_missing(&mut self) {
+        self.is_united = true;
     }
 
     /// Measures the host's work for a frame of the scene in `file`, and the effects of `changes` on the card
@@ -117,6 +131,9 @@ impl<'a> HostBench<'a> {
         let name = format!("host-{}", file.split('.').next().unwrap_or_default());
         if let Some(known) = self.store.get(&name, &key) {
             return Ok(known);
+        }
+        if self.is_united {
+            return Err(PartError::MissingPoint { point: name, part: "1".to_owned() }.into());
         }
         let frame = self.pool.install(|| self.frame(&scene, settings, changes));
         let frame = frame.map_err(|error| match error {

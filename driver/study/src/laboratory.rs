@@ -1,12 +1,14 @@
 //! Measures points whose results are not in the store yet. Points with the same card image are measured one
 //! after another, so that photons are traced once for all of them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{MappedImage, check_image, check_packed, map_photons};
 use photoncard_render::RenderError;
+use photoncard_render::emulator::direct::TileMemory;
+use photoncard_render::parts::Part;
 use photoncard_scene::{Scene, gltf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
@@ -14,6 +16,7 @@ use serde_json::Value;
 
 use super::error::StudyError;
 use super::measure::{Bench, Measurement};
+use super::parts::{PartError, Union, deal};
 use super::point::{ImageKey, Point, Task};
 use super::quality::{Quality, Reference};
 use super::store::PointStore;
@@ -81,6 +84,8 @@ pub struct Laboratory<'a> {
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
+    /// Parts whose points are in the store; no point is measured then.
+    united: Option<Union>,
     loaded: HashMap<String, Scene>,
     /// Card image of the last point, kept for a next point that needs the same image.
     last: Option<LastImage>,
@@ -121,10 +126,53 @@ impl<'a> Laboratory<'a> {
             store,
             pool,
             observer,
+            united: None,
             loaded: HashMap::new(),
             last: None,
             reference: None,
         })
+    }
+
+    /// Refuses points that are not in the store, which has those of the united parts.
+    ///
+    /// # Errors
+    /// If a scene is missing, or is not the one that the parts have measured.
+    pub(crate) fn refuse_missing(&mut self, united: &Union) -> Result<(), StudyError> {
+        for (name, checksum) in &united.scenes {
+            if self.load(name)?.checksum() != checksum {
+                return Err(PartError::OtherScene { scene: name.clone() }.into());
+            }
+        }
+        self.united = Some(united.clone());
+        Ok(())
+    }
+
+    /// Number of threads, each of which emulates a chip.
+    pub(crate) fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// Checksums of the scenes that were read, by name.
+    pub(crate) fn checksums(&self) -> BTreeMap<String, String> {
+        let of = |(name, scene): (&String, &Scene)| (name.clone(), scene.checksum().to_owned());
+        self.loaded.iter().map(of).collect()
+    }
+
+    /// Measures the points of a part that are not in the store yet.
+    ///
+    /// # Errors
+    /// As [`Self::measure`].
+    pub(crate) fn measure_part(
+        &mut self,
+        study: &str,
+        points: &[Point],
+        part: Part,
+    ) -> Result<(), StudyError> {
+        let points = sharing_images(points);
+        let numbers = deal(&points, part.count());
+        let own = points.into_iter().zip(numbers).filter(|(_, number)| *number == part.number());
+        let own: Vec<_> = own.map(|(point, _)| point).collect();
+        self.measure(study, &own).map(drop)
     }
 
     /// Measures the points that are not in the store yet. Returns the outcomes of all points.
@@ -133,6 +181,9 @@ impl<'a> Laboratory<'a> {
     /// If a scene is missing, a point cannot be measured or stored, or the observer stops the study.
     pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
         let points = sharing_images(points);
+        if let Some(united) = self.united.clone() {
+            return self.united_results(&points, united.parts);
+        }
         let total = points.len();
         let (mut results, mut missing) = (Vec::new(), Vec::new());
         for point in points {
@@ -149,6 +200,19 @@ impl<'a> Laboratory<'a> {
             let outcome = self.measured(&point)?;
             results.push((point, outcome));
             self.observer.progress(study, results.len(), total, true);
+        }
+        Ok(Results::new(results))
+    }
+
+    /// Returns the outcomes of points, which are all in the store.
+    fn united_results(&mut self, points: &[Point], parts: u32) -> Result<Results, StudyError> {
+        let mut results = Vec::new();
+        for (point, number) in points.iter().zip(deal(points, parts)) {
+            let Some(outcome) = self.stored(point)? else {
+                let part = format!("{number}/{parts}");
+                return Err(PartError::MissingPoint { point: point.name(), part }.into());
+            };
+            results.push((point.clone(), outcome));
         }
         Ok(Results::new(results))
     }
@@ -209,8 +273,9 @@ impl<'a> Laboratory<'a> {
             Task::Traffic { caches, .. } if point.is_along_curve => {
                 Outcome::Traffic(bench.along_curve(&point.settings, caches)?)
             }
-            Task::Traffic { chip, caches, sample, least_tiles } => {
-                Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
+            Task::Traffic { chip, caches, sample, least_tiles, has_reuse } => {
+                let model = TileMemory { caches, has_reuse: *has_reuse };
+                Outcome::Traffic(bench.traffic(&point.settings, *chip, model, *sample, *least_tiles)?)
             }
             &Task::Quality { tiles, reference_rays } => {
                 let known = self.reference.take().filter(|known| known.is_of(point, tiles, reference_rays));

@@ -15,6 +15,7 @@ mod index;
 mod laboratory;
 mod load_balance;
 mod measure;
+mod parts;
 mod point;
 mod provenance;
 mod quality;
@@ -23,6 +24,7 @@ mod sample;
 mod scale;
 mod store;
 mod studies;
+mod symbol_axes;
 mod whole_frame;
 
 use std::path::{Path, PathBuf};
@@ -33,18 +35,20 @@ pub use self::figures::check;
 use self::host::HostBench;
 pub use self::laboratory::{Laboratory, Results, StudyObserver};
 pub use self::measure::{Measurement, ReadSums, TileMeasurement};
+pub use self::parts::{Extent, PartError, RECORD, Union, unite};
 pub use self::point::{ALONG_CURVE, ImageKey, Point, Task};
 pub use self::quality::{Quality, TileDeviation};
 use self::report::Report;
 pub use self::report::{Cell, Figure, Provenance, ReportError, human};
 pub use self::sample::{Estimate, SampleRate};
 pub use self::scale::Scale;
-use self::scale::machine_row;
 pub use self::store::StoreError;
-pub use self::studies::{Study, Sweep};
+use self::studies::SweptScene;
+pub use self::studies::{Hardware, Study, Sweep};
+pub use self::symbol_axes::{SymbolAxes, SymbolAxesError};
 pub use self::whole_frame::{FrameOutcome, WholeFrame};
 use photoncard_picture::choice::Choice;
-use photoncard_render::cost_model::Machine;
+use photoncard_render::parts::Part;
 use photoncard_scene::{Scene, SceneContents};
 
 /// Options of [`run`]: the studies, their scale, and the folders that they read and write.
@@ -65,6 +69,8 @@ pub struct StudyOptions {
     pub threads: Option<usize>,
     /// Provenance of the numbers. Each report adds its settings.
     pub provenance: Provenance,
+    /// Whether all points are measured, those of a part, or none.
+    pub extent: Extent,
 }
 
 /// Measures the points of all studies, and writes a report for each study and `figures.csv` with the key
@@ -72,11 +78,19 @@ pub struct StudyOptions {
 /// does not measure the same points again.
 ///
 /// # Errors
-/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the
-/// study.
+/// If a scene is missing, a point cannot be measured, a file cannot be written, the observer stops the study,
+/// or a point of united parts is missing.
 pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
+    match &options.extent {
+        Extent::Whole => {}
+        Extent::Part { part, command } => return run_part(options, (*part, command), laboratory, &mut bench),
+        Extent::Merged(united) => {
+            laboratory.refuse_missing(united)?;
+            bench.refuse_missing();
+        }
+    }
     let mut reports: Vec<(Study, Report)> = Vec::new();
     for &study in &options.studies {
         let results = laboratory.measure(study.name(), &study.points(&options.scale))?;
@@ -95,6 +109,25 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
     figures::write(&options.out, &options.scale, check, figures)
 }
 
+/// Measures the share of a part, and writes its record. The first part measures the host's work.
+fn run_part(
+    options: &StudyOptions,
+    (part, command): (Part, &[String]),
+    mut laboratory: Laboratory,
+    bench: &mut HostBench,
+) -> Result<(), StudyError> {
+    for study in &options.studies {
+        laboratory.measure_part(study.name(), &study.points(&options.scale), part)?;
+        if part.number() == 1 {
+            study.host_frames(&options.scale, bench)?;
+        }
+    }
+    laboratory.measure_part(figures::CHECK, &figures::check_points(), part)?;
+    let threads = laboratory.threads();
+    let provenance = &options.provenance;
+    Ok(parts::write_record(&options.out, (part, command), laboratory.checksums(), threads, provenance)?)
+}
+
 /// Options of [`run_sweep`].
 pub struct SweepOptions {
     /// Sweep to run.
@@ -107,11 +140,14 @@ pub struct SweepOptions {
     pub out: PathBuf,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
-    /// Machine for which the report's times are computed.
-    pub machine: Machine,
     /// Provenance of the numbers. The report adds its settings.
     pub provenance: Provenance,
+    /// Whether all points are measured, those of a part, or none.
+    pub extent: Extent,
 }
+
+/// Name of the measurements of a sweep.
+const SWEEP: &str = "sweep";
 
 /// Measures all points of a sweep and writes its report. All points are checked before the first is measured.
 /// Results are stored as by [`run`].
@@ -120,7 +156,7 @@ pub struct SweepOptions {
 /// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the
 /// sweep.
 pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
-    let SweepOptions { sweep, name, scene, out, threads, machine, mut provenance } = options;
+    let SweepOptions { sweep, name, scene, out, threads, mut provenance, extent } = options;
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
@@ -128,12 +164,22 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
             Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
         point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
     }
+    let checksum = scene.checksum().to_owned();
     let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;
     laboratory.add(&name, scene);
-    let results = laboratory.measure("sweep", sweep.points())?;
+    match extent {
+        Extent::Whole => {}
+        Extent::Part { part, command } => {
+            laboratory.measure_part(SWEEP, sweep.points(), part)?;
+            let (scenes, threads) = (laboratory.checksums(), laboratory.threads());
+            return Ok(parts::write_record(&out, (part, &command), scenes, threads, &provenance)?);
+        }
+        Extent::Merged(united) => laboratory.refuse_missing(&united)?,
+    }
+    let results = laboratory.measure(SWEEP, sweep.points())?;
     provenance.settings.extend(sweep.rows());
-    provenance.settings.push(machine_row(&machine));
-    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results, &machine) })?)
+    let scene = SweptScene { name: &name, checksum: &checksum };
+    Ok(report::write(&out, &Report { provenance, ..sweep.report(scene, &results) })?)
 }
 
 fn folder(options: &StudyOptions, study: Study) -> PathBuf {

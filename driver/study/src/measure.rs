@@ -4,8 +4,11 @@ use photoncard_cards::scheduler::tiles;
 use photoncard_map::photon_map::{MappedImage, PhotonMapSize};
 use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::contents::Contents;
-use photoncard_render::emulator::direct::{RenderedTile, render_tiles_apart, render_tiles_in_flight};
+use photoncard_render::emulator::direct::{
+    RenderedTile, TileMemory, render_tiles_apart, render_tiles_in_flight,
+};
 use photoncard_render::emulator::memory_model::{CacheSettings, MemoryTraffic};
+use photoncard_render::emulator::reuse::{Reuse, ReuseCounts};
 use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
@@ -43,6 +46,9 @@ pub struct TileMeasurement {
     pub waiting_written_bytes: u64,
     /// Counts of the nodes, triangles, photons and other data in the lines of memory that the chip read.
     pub contents: Contents,
+    /// Reuse of cache lines of each structure, in the order of [`Structure::ALL`], if it was counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reuse: Option<Box<Reuse>>,
 }
 
 /// Work and memory traffic of a point.
@@ -65,7 +71,13 @@ impl TileMeasurement {
         });
         let waiting_written_bytes =
             traffic.requested.written_bytes(|structure| structure == Structure::Waiting);
-        Self { tile, stands_for, counters, reads, waiting_written_bytes, contents: traffic.contents }
+        let contents = traffic.contents;
+        Self { tile, stands_for, counters, reads, waiting_written_bytes, contents, reuse: None }
+    }
+
+    /// Reuse of cache lines of one structure; `None` if it was not counted.
+    pub(crate) fn reuse_of(&self, structure: Structure) -> Option<&ReuseCounts> {
+        self.reuse.as_ref().map(|reuse| &reuse[structure as usize])
     }
 
     /// Reads of the photon map.
@@ -154,7 +166,7 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders `tiles` on chips of the kind `chip`. If `caches` is given, the memory is modelled with these
+    /// Renders `tiles` on chips of the kind `chip`. If `model` is given, the memory is modelled with its
     /// caches, which are empty when a tile begins.
     ///
     /// # Errors
@@ -164,10 +176,10 @@ impl Bench<'_> {
         chip: EmulatedKind,
         frame: &FrameParameters,
         tiles: &[Tile],
-        caches: Option<&CacheSettings>,
+        model: Option<TileMemory>,
     ) -> Result<Vec<RenderedTile>, RenderError> {
         let image = &self.mapped.image;
-        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, caches, self.is_stopped)?)
+        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, model, self.is_stopped)?)
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. If a chip has several
@@ -180,7 +192,7 @@ impl Bench<'_> {
         &self,
         settings: &RenderSettings,
         chip: EmulatedKind,
-        caches: &CacheSettings,
+        model: TileMemory,
         sample: SampleRate,
         least_tiles: usize,
     ) -> Result<Measurement, RenderError> {
@@ -190,13 +202,15 @@ impl Bench<'_> {
         let are_several =
             settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1;
         if is_in_rounds || are_several {
-            return self.in_flight(chip, &frame, &all, caches);
+            return self.in_flight(chip, &frame, &all, model);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
-        let rendered = self.render(chip, &frame, &tiles, Some(caches))?;
+        let rendered = self.render(chip, &frame, &tiles, Some(model))?;
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
-            TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
+            let reuse = rendered.reuse.clone();
+            let measured = TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic);
+            TileMeasurement { reuse, ..measured }
         });
         Ok(Measurement {
             tiles: measured.collect(),
@@ -212,7 +226,7 @@ impl Bench<'_> {
         chip: EmulatedKind,
         frame: &FrameParameters,
         tiles: &[Tile],
-        caches: &CacheSettings,
+        model: TileMemory,
     ) -> Result<Measurement, RenderError> {
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
@@ -222,13 +236,14 @@ impl Bench<'_> {
             !stopped
         };
         let image = &self.mapped.image;
-        let render = || render_tiles_in_flight(chip, image, frame, tiles, caches, &mut take);
-        let traffic = self.pool.install(render).map_err(RenderError::Image)?;
+        let render = || render_tiles_in_flight(chip, image, frame, tiles, model, &mut take);
+        let (traffic, reuse) = self.pool.install(render).map_err(RenderError::Image)?;
         if stopped {
             return Err(RenderError::Stopped);
         }
+        let measured = TileMeasurement::new(0, 1, counters, &traffic);
         Ok(Measurement {
-            tiles: vec![TileMeasurement::new(0, 1, counters, &traffic)],
+            tiles: vec![TileMeasurement { reuse, ..measured }],
             rendered: tiles.len(),
             map: PhotonMapSize::of(&self.mapped.image),
         })

@@ -47,6 +47,8 @@ pub enum Task {
         sample: SampleRate,
         /// Minimum number of tiles to render, if the picture has that many.
         least_tiles: usize,
+        /// True to count the reuse of cache lines, which takes time.
+        has_reuse: bool,
     },
     /// Error of indirect light, compared with a reference with many more gather rays.
     Quality {
@@ -85,6 +87,14 @@ impl Point {
                 ),
             });
         }
+        if let (true, Task::Traffic { has_reuse: true, .. }) = (self.is_along_curve, &self.task) {
+            return Err(RenderError::Setting {
+                field: "schedule.order",
+                value: ALONG_CURVE.to_owned(),
+                reason: "the host does its gathers, and the reuse of lines is counted on chips".to_owned(),
+                remedy: "measure it without reuse, or use another `schedule.order`, such as sort".to_owned(),
+            });
+        }
         self.settings.check()?;
         self.settings.check_budget(&self.chip().budget())
     }
@@ -117,14 +127,17 @@ impl Point {
         let mut key = json!({
             "identity": identity(&self.settings, scene),
             "work": self.settings.of_work(),
-            "chip": self.chip().budget(),
+            "chip": self.chip().emulated().to_json(),
             "scene": self.scene,
             "set": self.assignments,
         });
         key["work"]["order"] = self.order().into();
         key["task"] = match &self.task {
-            Task::Traffic { chip: _, caches, sample, least_tiles } => {
-                json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
+            Task::Traffic { chip: _, caches, sample, least_tiles, has_reuse } => {
+                let caches = caches.to_string();
+                json!({"traffic": {
+                    "caches": caches, "sample": sample, "least_tiles": least_tiles, "reuse": has_reuse,
+                }})
             }
             Task::Quality { tiles, reference_rays } => {
                 json!({"quality of indirect light": {"tiles": tiles, "reference_rays": reference_rays}})

@@ -8,15 +8,16 @@ use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::Machine;
 use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::memory_model::CacheSettings;
-use photoncard_render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
+use photoncard_render::{ChipModel, Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
 
 use super::point::{Point, Task};
 use super::sample::SampleRate;
+use super::symbol_axes::SymbolAxes;
 
 /// Side of the tiles in Steinhurst's dissertation (2007), pixels.
 pub(super) const TILE: u32 = 16;
 /// Side of the largest square tile that the reference chip can render, pixels.
-pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
+pub(super) const REFERENCE_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
 /// Settings that all points of a study have in common, and whether studies have many points or few.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +44,11 @@ pub struct Scale {
     pub is_quick: bool,
     /// Machine for which times and numbers of chips are computed.
     pub machine: Machine,
+    /// Chips that render the points, and whose caches are those of points that do not vary caches; `None` for
+    /// reference chips.
+    pub model: Option<ChipModel>,
+    /// Values of symbols of Table 7.1 for which its formulas are evaluated as well; `None` for its own alone.
+    pub symbols: Option<SymbolAxes>,
 }
 
 impl Scale {
@@ -59,6 +65,8 @@ impl Scale {
         reference_rays: 1600,
         is_quick: false,
         machine: Machine::NOMINAL,
+        model: None,
+        symbols: None,
     };
     /// Scale with a small picture and fewer values, for a trial of all studies.
     pub const QUICK: Self = Self {
@@ -73,6 +81,8 @@ impl Scale {
         reference_rays: 400,
         is_quick: true,
         machine: Machine::NOMINAL,
+        model: None,
+        symbols: None,
     };
 
     /// Returns whether all points have the settings of the dissertation's nominal frame. Published figures
@@ -80,14 +90,39 @@ impl Scale {
     pub(crate) fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
-        frame(self) == frame(&Self::FULL)
+        self.model.is_none() && frame(self) == frame(&Self::FULL)
     }
 
-    /// Text that marks figures as those of a trial; `None` for the settings of the nominal frame.
+    /// Kind of the chips that render the points.
+    pub(crate) fn chip(&self) -> EmulatedKind {
+        self.model.as_ref().map_or(EmulatedKind::Reference, ChipModel::kind)
+    }
+
+    /// Caches of the points that do not vary caches.
+    pub(crate) fn caches(&self) -> CacheSettings {
+        self.model.as_ref().map_or_else(CacheSettings::default, ChipModel::caches)
+    }
+
+    /// Side of the largest square tile that the chips can render, pixels.
+    pub(crate) fn widest_tile(&self) -> u32 {
+        self.chip().budget().tile_pixels.isqrt()
+    }
+
+    /// Text that marks figures as those of a trial, or of another chip than the reference chip; `None` for
+    /// the settings of the nominal frame.
     pub fn banner(&self) -> Option<String> {
+        let of_trial = self.trial();
+        let of_chip = self.model.as_ref().map(|model| {
+            format!("Of the chip {model}, not of the reference chip: published figures are left out.")
+        });
+        of_trial.or(of_chip)
+    }
+
+    fn trial(&self) -> Option<String> {
         let Self { side, photons, neighbors, gather_rays, .. } = self;
         let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
-        (!self.is_nominal()).then(|| {
+        let is_trial = !Self { model: None, ..self.clone() }.is_nominal();
+        is_trial.then(|| {
             format!(
                 "Trial, no result: {side}x{side} pixels, {photons} photons, {neighbors} neighbours and {gather_rays} gather rays instead \
                  of the nominal {nominal_side}x{nominal_side} pixels and {nominal_photons} photons. Published figures are left out, and \
@@ -105,6 +140,11 @@ impl Scale {
     /// machine.
     pub fn on(self, machine: Machine) -> Self {
         Self { machine, ..self }
+    }
+
+    /// Replaces the chips that render the points.
+    pub fn with_chips(self, model: ChipModel) -> Self {
+        Self { model: Some(model), ..self }
     }
 
     /// Values over which a study varies a setting: `quick` if [`Self::is_quick`], else `full`.
@@ -141,7 +181,7 @@ impl Scale {
             s.photons.layout = PhotonLayout::Lines;
             s.integrator.sampling = Sampling::Product;
             s.integrator.irradiance_error = Some(IRRADIANCE_ERROR);
-            s.schedule.tile = Some(WIDEST_TILE);
+            s.schedule.tile = Some(self.widest_tile());
         })
     }
 
@@ -151,15 +191,16 @@ impl Scale {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
-    /// Point that measures the memory traffic of a sample of the tiles, with the nominal caches.
+    /// Point that measures the memory traffic of a sample of the tiles, with the chip's caches.
     pub fn traffic(&self, scene: &str, settings: RenderSettings) -> Point {
-        self.traffic_behind(scene, settings, CacheSettings::default())
+        self.traffic_behind(scene, settings, self.caches())
     }
 
     /// Point that measures the memory traffic of a sample of the tiles, with `caches`.
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
-        let chip = EmulatedKind::Reference;
-        let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
+        let chip = self.chip();
+        let (sample, least_tiles) = (self.sample, self.least_tiles);
+        let task = Task::Traffic { chip, caches, sample, least_tiles, has_reuse: false };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
@@ -172,11 +213,12 @@ impl Scale {
         chip: EmulatedKind,
         caches: CacheSettings,
     ) -> Point {
-        let task = Task::Traffic { chip, caches, sample: SampleRate::ALL, least_tiles: self.least_tiles };
+        let (sample, least_tiles) = (SampleRate::ALL, self.least_tiles);
+        let task = Task::Traffic { chip, caches, sample, least_tiles, has_reuse: false };
         Point { task, ..self.traffic_behind(scene, settings, caches) }
     }
 
-    /// Point that measures the memory traffic of all tiles, with the nominal caches.
+    /// Point that measures the memory traffic of all tiles, with the chip's caches.
     pub fn whole(&self, scene: &str, settings: RenderSettings) -> Point {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
@@ -203,13 +245,14 @@ impl Scale {
             ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
             ("photon map", format!("{}, unless said otherwise", settings.photons.layout.name())),
             ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),
-            ("caches, unless said otherwise", CacheSettings::default().to_string()),
+            ("caches, unless said otherwise", self.caches().to_string()),
             ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),
             ("caches at a tile's begin", "empty".to_owned()),
             ("tiles in flight, unless said otherwise", "1".to_owned()),
         ]
         .map(|(name, value)| (name.to_owned(), value));
-        rows.into_iter().chain([machine_row(&self.machine)]).collect()
+        let model = self.model.as_ref().map(|model| ("chip that renders".to_owned(), model.to_string()));
+        rows.into_iter().chain(model).chain([machine_row(&self.machine)]).collect()
     }
 
     /// Number of gathers of a frame in which every gather ray of every pixel ends in a gather: `side^2 N_FG`,

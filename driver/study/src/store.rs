@@ -17,7 +17,7 @@ use thiserror::Error;
 use super::report::is_portable;
 
 /// Name of the points' folder within the study's folder.
-const POINTS: &str = "points";
+pub(crate) const POINTS: &str = "points";
 
 /// Error of the store.
 #[derive(Debug, Error)]

@@ -137,7 +137,7 @@ impl WholeFrame<'_> {
                 return Err(RenderError::Stopped);
             }
             let mut outlet = Outlet(Vec::new());
-            let tile = render_tile_of(chip, image, Some(caches), frame, tile, Some(&mut outlet));
+            let tile = render_tile_of(chip, image, Some(caches.into()), frame, tile, Some(&mut outlet));
             Ok(CastTile { tile: tile.map_err(RenderError::Image)?, waiting: outlet.0 })
         };
         tiles.par_iter().map_init(|| EmulatedKind::Reference.emulated().chip(), cast_one).collect()

@@ -9,12 +9,13 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::Machine;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::parts::Part;
 use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{
-    Axis, AxisError, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
-    StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Extent, Hardware, Laboratory, Point, Provenance, Quality, RECORD, SampleRate, Scale,
+    Study, StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep, unite,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -76,6 +77,7 @@ fn options(out: &Path, studies: &[Study]) -> StudyOptions {
         is_collection: studies.len() > 1,
         threads: Some(2),
         provenance: Provenance::here("photoncard study"),
+        extent: Extent::Whole,
     }
 }
 
@@ -168,6 +170,42 @@ fn a_stopped_study_goes_on_where_it_stopped() {
     );
 }
 
+/// The union of parts is the whole, byte for byte, but for the times of the host's work, which no two runs
+/// share.
+#[test]
+fn parts_of_studies_add_up_to_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |name: &str, extent: Extent| {
+        let scale = Scale { side: 24, gather_rays: 4, ..tiny() };
+        let studies = [Study::Table71, Study::Interactive];
+        StudyOptions { scale, extent, ..options(&folder.path().join(name), &studies) }
+    };
+    let all = Counting::up_to(usize::MAX);
+    run(&of("whole", Extent::Whole), &all).unwrap();
+    let parts: Vec<_> = (1..=3).map(|number| folder.path().join(number.to_string())).collect();
+    for (part, path) in Part::all(3).zip(&parts) {
+        let command = vec!["study".to_owned()];
+        run(&of(&part.number().to_string(), Extent::Part { part, command }), &all).unwrap();
+        let names: Vec<_> =
+            files(path).into_keys().map(|file| file.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, [RECORD], "a part writes no report");
+    }
+    let united = unite(&parts, &folder.path().join("merged")).unwrap();
+    let none = Counting::up_to(usize::MAX);
+    run(&of("merged", Extent::Merged(united.clone())), &none).unwrap();
+    assert_eq!(none.measured(), 0);
+    let [whole, merged] = ["whole/table-7.1", "merged/table-7.1"].map(|name| folder.path().join(name));
+    let names = |root: &Path| -> Vec<_> {
+        files(root).into_iter().map(|(path, bytes)| (path.file_name().unwrap().to_owned(), bytes)).collect()
+    };
+    assert!(names(&whole) == names(&merged) && !names(&whole).is_empty());
+    assert!(folder.path().join("merged/interactive/host.csv").exists());
+    // The host's work is a point of the first part.
+    fs::remove_dir_all(folder.path().join("merged")).unwrap();
+    let error = run(&of("merged", Extent::Merged(united)), &none).unwrap_err();
+    assert!(error.is_input() && error.to_string().contains("is missing"), "{error}");
+}
+
 #[test]
 fn all_tiles_add_up_to_the_render() {
     let folder = tempfile::tempdir().unwrap();
@@ -228,7 +266,7 @@ fn a_missing_scene_is_named_with_its_folder() {
 }
 
 /// Sweep of a small scene over orders and caches.
-fn sweep() -> Sweep {
+fn sweep(machine: Machine) -> Sweep {
     let axis = |name: &str, values: &[&str]| Axis {
         name: name.to_owned(),
         values: values.iter().map(|&value| value.to_owned()).collect(),
@@ -238,20 +276,25 @@ fn sweep() -> Sweep {
     let point = |values: Vec<(&str, &str)>| {
         let [(_, order), (_, caches)] = values[..] else { panic!("{values:?}") };
         let settings = tiny().settings(GatherOrder::of_name(order).unwrap());
-        Ok::<_, AxisError>(tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()))
+        let hardware = Hardware::new(&EmulatedKind::Reference.into(), machine);
+        Ok::<_, AxisError>((tiny().traffic_behind("mine.gltf", settings, caches.parse().unwrap()), hardware))
     };
     Sweep::new(axes, point).unwrap()
 }
 
 fn sweep_options(out: &Path) -> SweepOptions {
+    sweep_options_on(out, Machine::NOMINAL)
+}
+
+fn sweep_options_on(out: &Path, machine: Machine) -> SweepOptions {
     SweepOptions {
-        sweep: sweep(),
+        sweep: sweep(machine),
         name: "mine.gltf".to_owned(),
         scene: gltf::load(&scenes().join("cornell.gltf")).unwrap(),
         out: out.to_owned(),
         threads: Some(2),
-        machine: Machine::NOMINAL,
         provenance: Provenance::here("photoncard study sweep"),
+        extent: Extent::Whole,
     }
 }
 
@@ -277,9 +320,11 @@ fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
         "by-order.svg",
         "index.html",
         "points.csv",
+        "points.json",
         "structures-by-cache.svg",
         "structures-by-order.svg",
         "structures.csv",
+        "structures.json",
     ];
     assert_eq!(names, expected);
     let values: Vec<_> =
@@ -298,18 +343,20 @@ fn a_sweep_is_measured_like_a_study_and_goes_on_where_it_stopped() {
     assert_eq!(again.measured(), 0);
 }
 
-/// Seconds of memory and of arithmetic, the last two columns of a sweep's points.
+/// Seconds of memory and of arithmetic of a sweep's points.
 fn seconds(path: &Path) -> [Vec<f64>; 2] {
-    [2, 1].map(|from_end| rows(path).iter().map(|row| row[row.len() - from_end].parse().unwrap()).collect())
+    let rows: Vec<serde_json::Value> = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    ["chip's memory (s)", "chip's arithmetic (s)"]
+        .map(|column| rows.iter().map(|row| row[column].as_f64().unwrap()).collect())
 }
 
 #[test]
 fn another_machine_changes_times_of_the_points_that_are_measured_already() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("points.csv");
+    let path = folder.path().join("points.json");
     let run_on = |machine| {
         let observer = Counting::up_to(usize::MAX);
-        run_sweep(SweepOptions { machine, ..sweep_options(folder.path()) }, &observer).unwrap();
+        run_sweep(sweep_options_on(folder.path(), machine), &observer).unwrap();
         (observer.measured(), seconds(&path))
     };
     let Machine { bandwidth, flops, .. } = Machine::NOMINAL;
@@ -329,8 +376,8 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
     let observer = Counting::up_to(usize::MAX);
     let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
     let on = |chip, settings| {
-        let task =
-            Task::Traffic { chip, caches: CacheSettings::default(), sample: SampleRate::ALL, least_tiles: 1 };
+        let (caches, sample) = (CacheSettings::default(), SampleRate::ALL);
+        let task = Task::Traffic { chip, caches, sample, least_tiles: 1, has_reuse: false };
         Point { task, ..tiny().traffic("cornell.gltf", settings) }
     };
     let sorted = tiny().settings(GatherOrder::Sort).with(|s| s.integrator.gather_rays = 32);

@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PathBufValueParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
-use photoncard_driver::emulator::{Emulated, EmulatedKind, MIN_DRAM_BYTES};
+use photoncard_driver::emulator::{EmulatedKind, MIN_DRAM_BYTES};
 use photoncard_driver::link::LineFaults;
-use photoncard_driver::render::{CardAddress, CardSet, MAX_DRAM_BYTES};
+use photoncard_driver::render::{CardAddress, CardSet, ChipModel, MAX_DRAM_BYTES};
 use photoncard_shared::address::LINE_BYTES;
 
 use super::choice::choice;
@@ -25,8 +24,6 @@ pub(crate) struct CardOptions {
         help = format!("Where to render: {}; may be repeated [default: a chip a core]", CardAddress::forms())
     )]
     cards: Vec<CardAddress>,
-    #[command(flatten)]
-    pub(super) chip: ChipOption,
     #[command(flatten)]
     pub(super) memory: MemoryOption,
     /// Share of the tiles, above 0 and at most 1, that are rendered by two cards each and compared bit for
@@ -44,7 +41,7 @@ pub(crate) struct CardOptions {
     #[arg(long, hide_short_help = true)]
     counters: bool,
     /// Caches of the memory model, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=...;
-    /// implies --counters [default: the caches of the first card's kind, such as
+    /// implies --counters [default: the caches of the first card's chip, such as
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
@@ -74,10 +71,7 @@ impl CardOptions {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
         let cards = CardSet {
-            addresses: addresses
-                .into_iter()
-                .map(|card| self.memory.of(card.of_kind(|kind| self.chip.or(kind))))
-                .collect(),
+            addresses: addresses.into_iter().map(|card| self.memory.of(card)).collect(),
             faults: self.faults,
             verify: self.verify,
             caches: self.cache,
@@ -92,29 +86,23 @@ impl CardOptions {
     }
 }
 
+/// Model of emulated chips that a command takes without their number.
 #[derive(Args)]
 pub(crate) struct ChipOption {
-    /// Emulate chips with the capacities in a JSON file, whatever kind --card names
-    #[arg(long, value_name = "CHIP.json", value_parser = kind_of_file(), help_heading = "Cards", hide_short_help = true)]
-    chip: Option<EmulatedKind>,
-}
-
-impl ChipOption {
-    /// Returns the kind of chip that the file of `--chip` describes, or `kind` if `--chip` is not stated.
-    pub(crate) fn or(&self, kind: EmulatedKind) -> EmulatedKind {
-        self.chip.unwrap_or(kind)
-    }
-
-    pub(crate) fn is_stated(&self) -> bool {
-        self.chip.is_some()
-    }
+    #[arg(
+        long = "card",
+        value_name = "CHIP",
+        default_value_t = ChipModel::from(EmulatedKind::Reference),
+        help_heading = "Cards",
+        help = format!("The chips: {}", ChipModel::forms())
+    )]
+    pub(crate) model: ChipModel,
 }
 
 #[derive(Args)]
 pub(crate) struct MemoryOption {
     /// Memory of each emulated card, in bytes or with the suffix K, M or G [default: a quarter of the
-    /// machine's free memory, at least 512M; emulated-micro and chips of --chip have the memory of their
-    /// kind]
+    /// machine's free memory, at least 512M; emulated-micro and chips of a file have their own memory]
     #[arg(long, value_name = "SIZE", value_parser = memory_size, help_heading = "Cards", hide_short_help = true)]
     card_memory: Option<u64>,
 }
@@ -129,10 +117,12 @@ impl MemoryOption {
     }
 
     fn with_free(&self, free: Option<u64>, address: CardAddress) -> CardAddress {
-        let memory = self.card_memory.or_else(|| match address {
-            CardAddress::Emulated { kind: EmulatedKind::Reference | EmulatedKind::Large, memory, .. } => {
+        let memory = self.card_memory.or_else(|| match &address {
+            CardAddress::Emulated { model, memory, .. }
+                if matches!(model.kind(), EmulatedKind::Reference | EmulatedKind::Large) =>
+            {
                 let quarter = (free? / 4).min(MAX_DRAM_BYTES);
-                Some(memory.max(quarter - quarter % LINE_BYTES as u64))
+                Some((*memory).max(quarter - quarter % LINE_BYTES as u64))
             }
             _ => None,
         });
@@ -160,11 +150,6 @@ pub(super) fn memory_size(text: &str) -> Result<u64, String> {
         .ok_or_else(|| {
             format!("use bytes, with K, M or G for powers of 1024, from 1M to {}G", MAX_DRAM_BYTES >> 30)
         })
-}
-
-/// Returns a parser that reads the JSON file at the argument's path, and yields the kind of chip in it.
-fn kind_of_file() -> impl TypedValueParser<Value = EmulatedKind> {
-    PathBufValueParser::new().try_map(|path| Emulated::read(&path).map(EmulatedKind::File))
 }
 
 #[cfg(test)]

@@ -4,19 +4,19 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use clap::Args;
-use photoncard_driver::cost_model::Machine;
+use photoncard_driver::cost_model::Rates;
 
 /// Rates of the machine for which a study computes times. The measured numbers of reads and operations do not
 /// depend on these rates.
 #[derive(Args)]
 #[command(next_help_heading = "Chip of the report's times")]
 pub(crate) struct RateOptions {
-    /// Bandwidth of a chip's DRAM, GB/s
-    #[arg(long, value_name = "GB/S", default_value = "90", value_parser = giga, allow_negative_numbers = true)]
-    bandwidth: f64,
-    /// Arithmetic of a chip, GFLOPS
-    #[arg(long, value_name = "GFLOPS", default_value = "500", value_parser = giga, allow_negative_numbers = true)]
-    flops: f64,
+    /// Bandwidth of a chip's DRAM, GB/s [default: that of the chip's file, or 90]
+    #[arg(long, value_name = "GB/S", value_parser = giga, allow_negative_numbers = true)]
+    bandwidth: Option<f64>,
+    /// Arithmetic of a chip, GFLOPS [default: that of the chip's file, or 500]
+    #[arg(long, value_name = "GFLOPS", value_parser = giga, allow_negative_numbers = true)]
+    flops: Option<f64>,
 }
 
 /// Machine for which a study computes times and numbers of chips. The measured numbers of reads and
@@ -27,45 +27,37 @@ pub(crate) struct MachineOptions {
     #[command(flatten)]
     rates: RateOptions,
     /// Latency of a read from DRAM, nanoseconds; the studies reordering and interactive use it for their
-    /// times
-    #[arg(long, value_name = "NS", default_value = "100", value_parser = latency, allow_negative_numbers = true)]
-    latency: f64,
+    /// times [default: that of the chip's file, or 100]
+    #[arg(long, value_name = "NS", value_parser = latency, allow_negative_numbers = true)]
+    latency: Option<f64>,
     /// Number of rays or gathers in flight in each unit of a chip; the studies reordering and interactive use
-    /// it for their times
-    #[arg(long, value_name = "N", default_value = "128", value_parser = tasks, allow_negative_numbers = true)]
-    tasks: u32,
+    /// it for their times [default: that of the chip's file, or 128]
+    #[arg(long, value_name = "N", value_parser = tasks, allow_negative_numbers = true)]
+    tasks: Option<u32>,
 }
 
-/// Valid range of bandwidth, GB/s, and of arithmetic, GFLOPS.
-const GIGA: RangeInclusive<f64> = 0.1..=1e6;
-/// Valid range of latency, nanoseconds.
-const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
-/// Valid range of tasks in flight.
-const TASKS: RangeInclusive<u32> = 1..=65_536;
-
 impl RateOptions {
-    /// Nominal machine, but with the bandwidth and the arithmetic rate of these options.
-    pub(crate) fn machine(&self) -> Machine {
-        Machine { bandwidth: 1e9 * self.bandwidth, flops: 1e9 * self.flops, ..Machine::NOMINAL }
+    pub(crate) fn rates(&self) -> Rates {
+        Rates { bandwidth_gb_s: self.bandwidth, gflops: self.flops, ..Rates::default() }
     }
 }
 
 impl MachineOptions {
-    pub(crate) fn machine(&self) -> Machine {
-        Machine { latency: self.latency / 1e9, tasks: self.tasks, ..self.rates.machine() }
+    pub(crate) fn rates(&self) -> Rates {
+        Rates { latency_ns: self.latency, tasks: self.tasks, ..self.rates.rates() }
     }
 }
 
 fn giga(text: &str) -> Result<f64, String> {
-    within(text, &GIGA)
+    within(text, &Rates::GIGA)
 }
 
 fn latency(text: &str) -> Result<f64, String> {
-    within(text, &LATENCY)
+    within(text, &Rates::LATENCY)
 }
 
 fn tasks(text: &str) -> Result<u32, String> {
-    within(text, &TASKS)
+    within(text, &Rates::TASKS)
 }
 
 /// Parses a number, which must be in a range.
@@ -80,6 +72,7 @@ fn within<T: FromStr + PartialOrd + std::fmt::Display>(
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use photoncard_driver::cost_model::Machine;
 
     use super::*;
 
@@ -91,7 +84,7 @@ mod tests {
 
     fn parsed(arguments: &[&str]) -> Result<Machine, clap::Error> {
         let words = ["study"].iter().chain(arguments);
-        Command::try_parse_from(words).map(|command| command.machine.machine())
+        Command::try_parse_from(words).map(|command| command.machine.rates().machine())
     }
 
     #[test]

@@ -39,8 +39,6 @@ use std::sync::LazyLock;
 
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
-use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::link::ListenAddress;
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::CardAddress;
@@ -48,7 +46,6 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
 use self::cards::{ChipOption, memory_size};
-use self::choice::choice;
 pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::frames::{FrameOptions, last_numbered, numbered};
@@ -61,11 +58,11 @@ pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
 #[cfg(feature = "study")]
-pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
+pub(crate) use self::study::{StudyArguments, StudyCommand, StudyMergeArguments};
 #[cfg(feature = "study")]
 pub(crate) use self::study_output::StudyOutput;
 #[cfg(feature = "study")]
-pub(crate) use self::sweep::{CACHE, SweepArguments};
+pub(crate) use self::sweep::{CACHE, CHIP, SweepArguments};
 pub(crate) use self::tonemap::TonemapOptions;
 pub(crate) use self::view::ViewOptions;
 
@@ -200,8 +197,6 @@ pub(crate) enum CardCommand {
     Info {
         #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
-        #[command(flatten)]
-        chip: ChipOption,
     },
     /// Greet a card repeatedly, and print the time until each answer
     Ping {
@@ -228,11 +223,8 @@ pub(crate) struct EmulateOptions {
     /// any free port
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
-    /// The kind of card
-    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>())]
-    pub(crate) card: EmulatedKind,
     #[command(flatten)]
-    pub(crate) chip: ChipOption,
+    pub(crate) card: ChipOption,
     /// Memory of the card, in bytes or with the suffix K, M or G [default: that of its kind]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub(crate) card_memory: Option<u64>,

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::quality::{Finish, Quality, Stated};
 use photoncard_driver::render::{Budget, CardAddress, CardSet, RenderSettings};
 
@@ -46,11 +45,9 @@ pub(crate) struct PrepareOptions {
     photons: PhotonOptions,
     #[command(flatten)]
     integrator: IntegratorOptions,
-    /// Kind of the cards that will render: the card image must fit their memory
-    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
-    card: EmulatedKind,
+    // The card image must fit the memory of the cards that will render.
     #[command(flatten)]
-    chip: ChipOption,
+    card: ChipOption,
     #[command(flatten)]
     memory: MemoryOption,
     /// Threads for the work [default: one per core]
@@ -67,12 +64,12 @@ pub(crate) struct PrepareOptions {
 impl PrepareOptions {
     /// Returns an emulated card with the kind and the memory of the cards that will render.
     fn cards(&self) -> CardAddress {
-        self.memory.of(CardAddress::emulated(self.chip.or(self.card)))
+        self.memory.of(CardAddress::emulated(self.card.model.clone()))
     }
 
     /// Returns the capacities of the cards that will render.
     pub(crate) fn budget(&self) -> Budget {
-        let budget = self.chip.or(self.card).budget();
+        let budget = self.card.model.kind().budget();
         Budget { dram_bytes: self.cards().dram_bytes(), ..budget }
     }
 

@@ -2,11 +2,11 @@
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
+use photoncard_driver::emulator::Emulated;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::RenderSettings;
-use photoncard_driver::study::{ALONG_CURVE, Axis, MAX_POINTS, Point, Scale, Task};
+use photoncard_driver::render::{ChipModel, RenderSettings};
+use photoncard_driver::study::{ALONG_CURVE, Axis, Hardware, MAX_POINTS, Point, Scale, Task};
 
 use super::cards::ChipOption;
 use super::choice::choice;
@@ -28,15 +28,18 @@ pub(crate) struct SweepArguments {
         value_parser = axis,
         help = format!(
             "Vary an option over values; may be repeated: every combination is measured, up to {MAX_POINTS}. Values with commas are \
-             separated by semicolons. A cache may be a SIZE or SIZE/LINE/WAYS of the photon map's. order={ALONG_CURVE} does all gathers of \
+             separated by semicolons. chip.NAME varies a capacity of the chip, such as chip.irradiance_records=256,512. A cache may be \
+             a SIZE or SIZE/LINE/WAYS of the photon map's. order={ALONG_CURVE} does all gathers of \
              a frame along a Hilbert curve, which no chip has room for: the bound of all orders"
         )
     )]
     pub(crate) vary: Vec<Axis>,
+    /// Count distances between reads of a cache line, and compulsory, capacity and conflict misses, by
+    /// structure: reuse.csv and reuse-distances.csv. It takes time
+    #[arg(long)]
+    reuse: bool,
     #[command(flatten)]
     pub(crate) output: StudyOutput,
-    #[command(flatten)]
-    pub(crate) machine: RateOptions,
     #[command(flatten)]
     settings: SweepSettings,
 }
@@ -55,16 +58,18 @@ struct SweepSettings {
     integrator: IntegratorOptions,
     #[command(flatten)]
     schedule: ScheduleOptions,
-    /// Kind of the chips
-    #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
-    card: EmulatedKind,
     #[command(flatten)]
-    chip: ChipOption,
+    card: ChipOption,
     /// Caches of the memory model, written as for photoncard render --cache; state the option several times
     /// to compare caches [default: those of the chip, such as photon=128K/128/4,scene=75K/128/4]
     #[arg(long = "cache", value_name = "CACHES", help_heading = "Cards")]
     caches: Vec<CacheSettings>,
+    #[command(flatten)]
+    machine: RateOptions,
 }
+
+/// Begin of the names of capacities in `--vary`.
+pub(crate) const CHIP: &str = "chip.";
 
 /// Name of the option `--cache` in `--vary`.
 pub(crate) const CACHE: &str = "cache";
@@ -80,12 +85,21 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
+    /// Model of the chips.
+    pub(crate) fn model(&self) -> &ChipModel {
+        &self.settings.card.model
+    }
+
+    /// Hardware of chips of a model, with the rates that these options state.
+    pub(crate) fn hardware(&self, model: &ChipModel) -> Hardware {
+        Hardware::new(model, self.settings.machine.rates().or(model.rates()).machine())
+    }
+
     /// Point (measurement) that the sweep varies: it has the settings of these options and the first of the
     /// stated caches. `name` is the name of the scene.
-    pub(crate) fn point(&self, name: &str) -> Point {
-        let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
+    pub(crate) fn point(&self, name: &str, model: &ChipModel) -> Point {
+        let SweepSettings { quality, picture, photons, integrator, schedule, caches, card: _, machine: _ } =
             &self.settings;
-        let chip = chip.or(*card);
         let base = quality.settings();
         let settings = RenderSettings {
             picture: picture.settings(&base.picture),
@@ -97,10 +111,11 @@ impl SweepArguments {
         // With one tile in flight, the traffic of each tile is counted by itself.
         let settings = settings.with(|s| s.schedule.in_flight = s.schedule.in_flight.or(Some(1)));
         let task = Task::Traffic {
-            chip,
-            caches: caches.first().copied().unwrap_or_else(|| chip.caches()),
+            chip: model.kind(),
+            caches: caches.first().copied().unwrap_or_else(|| model.caches()),
             sample: self.output.sample,
             least_tiles: Scale::FULL.least_tiles,
+            has_reuse: self.reuse,
         };
         let (scene, assignments) = (name.to_owned(), self.scene.assignments.clone());
         Point { scene, assignments, settings, is_along_curve: false, task }
@@ -117,6 +132,8 @@ fn axis(text: &str) -> Result<Axis, String> {
     let options = SweepSettings::augment_args(clap::Command::new("sweep"));
     let mut names: Vec<_> = options.get_arguments().filter_map(|option| option.get_long()).collect();
     names.push("set");
+    let capacities: Vec<_> = Emulated::capacities().map(|capacity| format!("{CHIP}{capacity}")).collect();
+    names.extend(capacities.iter().map(String::as_str));
     if !names.contains(&name) {
         return Err(format!("{name:?} is none of the options that can be varied: {}", names.join(", ")));
     }

@@ -21,7 +21,6 @@ impl RenderOptions {
         self.schedule.without_effect(&mut add);
         let is_emulated = |card: &CardAddress| matches!(card, CardAddress::Emulated { .. });
         let has_emulated = self.settings().cards.addresses.iter().any(is_emulated);
-        add(self.cards.chip.is_stated() && !has_emulated, "--chip", "without an emulated card");
         add(self.cards.memory.is_stated() && !has_emulated, "--card-memory", "without an emulated card");
         outputs.without_effect(&mut add);
         add(picture.aov.is_some() && !outputs.have_layers(), "--aov", "without -o OUT.exr");

@@ -1,63 +1,101 @@
 //! Command `photoncard study`.
 
+mod command;
 mod sweep;
 
+use std::ffi::OsString;
 use std::fmt::Write;
 use std::io::IsTerminal;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-use photoncard_driver::cost_model::Machine;
+use miette::MietteDiagnostic;
 use photoncard_driver::study::{
-    Provenance, Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep,
+    Extent, Provenance, StudyError, StudyObserver, StudyOptions, SweepOptions, run as study, run_sweep, unite,
 };
 
-use crate::arguments::{Selection, StudyArguments, StudyCommand, StudyOutput};
+use crate::arguments::{StudyArguments, StudyCommand, StudyMergeArguments};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::remaining::Remaining;
 use crate::progress::{duration, stop_on_signals};
-use crate::shell;
 
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Runs built-in studies, or a sweep, and writes their reports.
+/// Runs built-in studies or a sweep, or a part of them, or writes the report of their parts.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
+    if let Some(StudyCommand::Merge(merge)) = &arguments.own {
+        return run_merge(merge);
+    }
+    let stated = command::stated();
+    let provenance = Provenance::here(&command::line(&stated));
+    let part = match arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => sweep.output.part,
+        StudyArguments { output, .. } => output.as_ref().and_then(|output| output.part),
+    };
+    let extent = part.map_or(Extent::Whole, |part| Extent::Part { part, command: stated });
+    run_stated(arguments, &std::env::args_os().collect::<Vec<_>>(), provenance, extent)
+}
+
+/// Unites parts, and writes the report of their study.
+fn run_merge(merge: &StudyMergeArguments) -> Result<(), Failure> {
+    let union = unite(&merge.parts, &merge.out).map_err(|error| failure(error.into()))?;
+    let (words, mut arguments) = command::parse(&union.command, &merge.out)?;
+    let output = match &mut arguments {
+        StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => Some(&mut sweep.output),
+        StudyArguments { output, .. } => output.as_mut(),
+    };
+    if let Some(output) = output {
+        (output.threads, output.quiet) = (Some(union.threads), merge.quiet);
+    }
+    let here = Provenance::here(&command::line(&union.command));
+    let provenance = Provenance { date: union.date.clone(), host: union.host.clone(), ..here };
+    run_stated(&arguments, &words, provenance, Extent::Merged(union))
+}
+
+/// Runs the studies of arguments, which are parsed from `words`.
+fn run_stated(
+    arguments: &StudyArguments,
+    words: &[OsString],
+    provenance: Provenance,
+    extent: Extent,
+) -> Result<(), Failure> {
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
-            let options = sweep::options(sweep, Provenance::here(&command_line()))?;
+            let options = SweepOptions { extent, ..sweep::options(sweep, words, provenance)? };
             observed(sweep.output.quiet, |progress| run_sweep(options, progress).map_err(failure))
         }
-        StudyArguments { own: None, name: Some(name), output: Some(output), quick, scenes, machine } => {
-            run_shipped(*name, output, *quick, scenes, machine.machine())
+        StudyArguments { own: None, name: Some(name), output: Some(output), scenes, .. } => {
+            let scale = arguments.scale(*name, output.sample).map_err(|reason| refused(&reason))?;
+            let options = StudyOptions {
+                studies: name.studies(),
+                scale,
+                scenes: scenes.to_owned(),
+                out: output.out.clone(),
+                is_collection: name.is_collection(),
+                threads: output.threads,
+                provenance,
+                extent,
+            };
+            run_shipped(&options, output.quiet)
         }
         _ => unreachable!("name and output are required without a command"),
     }
 }
 
-fn run_shipped(
-    name: Selection,
-    output: &StudyOutput,
-    quick: bool,
-    scenes: &Path,
-    machine: Machine,
-) -> Result<(), Failure> {
-    let options = StudyOptions {
-        studies: name.studies(),
-        scale: if quick { Scale::QUICK } else { Scale::FULL }.with_sample(output.sample).on(machine),
-        scenes: scenes.to_owned(),
-        out: output.out.clone(),
-        is_collection: name.is_collection(),
-        threads: output.threads,
-        provenance: Provenance::here(&command_line()),
-    };
+/// Failure of arguments that are not possible together.
+fn refused(reason: &str) -> Failure {
+    let help = "photoncard study --help names the options of each study";
+    Failure::input(MietteDiagnostic::new(reason).with_help(help))
+}
+
+fn run_shipped(options: &StudyOptions, quiet: bool) -> Result<(), Failure> {
     if let Some(banner) = options.scale.banner() {
         say(format_args!("photoncard: {banner}"));
     }
-    observed(output.quiet, |progress| study(&options, progress).map_err(failure))
+    observed(quiet, |progress| study(options, progress).map_err(failure))
 }
 
 /// Runs `work`. Its progress is shown unless `quiet`.
@@ -74,11 +112,6 @@ fn failure(error: StudyError) -> Failure {
         error if error.is_input() => Failure::input(error),
         error => Failure::work(error),
     }
-}
-
-/// Command line of this process, quoted; the program is named `photoncard`, without its folder.
-fn command_line() -> String {
-    shell::command(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
 }
 
 /// Progress of a study: a bar on a terminal, elsewhere a line for each tenth.

@@ -6,14 +6,16 @@ use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
+use photoncard_driver::render::ChipModel;
 use photoncard_driver::scene::Scene;
-use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Provenance, Sweep, SweepOptions, Task};
+use photoncard_driver::study::{
+    ALONG_CURVE, AxisError, Extent, Hardware, Point, Provenance, Sweep, SweepOptions, Task,
+};
 
+use super::command::end_of_options;
 use crate::arguments::{
-    Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
+    Arguments, CACHE, CHIP, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
 };
 use crate::console::say;
 use crate::failure::Failure;
@@ -23,15 +25,19 @@ use crate::notices::{self, Uses};
 /// Name of a varied option, without its leading dashes, and one of the option's values.
 type Value<'a> = (&'a str, &'a str);
 
-/// Loads the scene of a sweep and creates its points.
-pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
+/// Loads the scene of a sweep and creates its points. `words` are the words of the arguments.
+pub(super) fn options(
+    arguments: &SweepArguments,
+    words: &[OsString],
+    provenance: Provenance,
+) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u64::from(u32::MAX))?;
     let name = input::name(&arguments.scene);
-    let picture = arguments.point(&name).settings.picture;
+    let picture = arguments.point(&name, arguments.model()).settings.picture;
     notices::say_ignored(&arguments.scene, &scene, &Uses::of(&arguments.scene, &picture, None))?;
     let mut notices = BTreeSet::new();
     let sweep = Sweep::new(arguments.axes(), |values| {
-        let made = point(arguments, &values, &scene, &mut notices);
+        let made = point((arguments, words), &values, &scene, &mut notices);
         made.map_err(PointError)
     });
     let sweep = sweep.map_err(|PointError(failure)| failure)?;
@@ -44,38 +50,49 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     settings.push(("scene-checksum".to_owned(), scene.checksum().to_owned()));
     let provenance = Provenance { settings, ..provenance };
     let StudyOutput { out, threads, .. } = &arguments.output;
-    let (out, threads, machine) = (out.clone(), *threads, arguments.machine.machine());
-    Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
+    let (out, threads) = (out.clone(), *threads);
+    Ok(SweepOptions { sweep, name, scene, out, threads, provenance, extent: Extent::Whole })
 }
 
-/// Returns the point of the sweep at which the options have these values, and adds notices about it to
-/// `notices`. If no size is stated, the picture has the camera's aspect ratio.
+/// Returns the point of the sweep at which the options have these values, with its hardware, and adds notices
+/// about it to `notices`. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
-    arguments: &SweepArguments,
+    (arguments, words): (&SweepArguments, &[OsString]),
     values: &[Value],
     scene: &Scene,
     notices: &mut BTreeSet<String>,
-) -> Result<Point, Failure> {
+) -> Result<(Point, Hardware), Failure> {
     let (caches, others): (Vec<_>, Vec<_>) = values.iter().copied().partition(|(name, _)| *name == CACHE);
+    let (capacities, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|(name, _)| name.starts_with(CHIP));
     let (curve, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|value| *value == ("order", ALONG_CURVE));
-    let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
+    let replaced = replaced(words, &others).map_err(|error| refused(&others, &reason(&error)))?;
     let arguments = replaced.as_ref().unwrap_or(arguments);
-    let mut point = arguments.point(&input::name(&arguments.scene));
+    let model = with_capacities(arguments.model().clone(), &capacities)?;
+    let mut point = arguments.point(&input::name(&arguments.scene), &model);
     point.is_along_curve = !curve.is_empty();
     if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
         *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
     }
-    if let Task::Traffic { chip, caches, .. } = &point.task {
-        notices.extend(beyond_chip(*chip, caches));
+    if let Task::Traffic { caches, .. } = &point.task {
+        notices.extend(beyond_chip(&model, caches));
     }
     let camera = point.settings.camera(scene)?;
     notices.extend(arguments.picture().fit(&camera, &mut point.settings.picture));
-    Ok(point)
+    Ok((point, arguments.hardware(&model)))
 }
 
-/// Parses this process's arguments with `values` added; `None` if there are no values.
-fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
+/// Replaces capacities of a chip by values of `--vary chip.NAME=`.
+fn with_capacities(model: ChipModel, values: &[Value]) -> Result<ChipModel, Failure> {
+    values.iter().try_fold(model, |model, (name, value)| {
+        let capacity = name.strip_prefix(CHIP).unwrap_or(name);
+        model.with_capacity(capacity, value).map_err(|error| refused(values, &error.to_string()))
+    })
+}
+
+/// Parses the words of a sweep's arguments with `values` added; `None` if there are no values.
+fn replaced(words: &[OsString], values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     if values.is_empty() {
         return Ok(None);
     }
@@ -84,9 +101,8 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
         study.mut_subcommand("sweep", |sweep| sweep.args_override_self(true))
     });
     let added = values.iter().map(|(name, value)| format!("--{name}={value}").into());
-    let mut given: Vec<OsString> = std::env::args_os().collect();
-    // Words after `--` are no options.
-    let end = given.iter().position(|word| word == "--").unwrap_or(given.len());
+    let mut given = words.to_vec();
+    let end = end_of_options(words);
     given.splice(end..end, added);
     let matches = command.try_get_matches_from(given)?;
     match Arguments::from_arg_matches(&matches)?.command {
@@ -96,17 +112,16 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
 }
 
 /// Notice about caches that are larger than the on-chip memory of `chip`.
-fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
+fn beyond_chip(chip: &ChipModel, caches: &CacheSettings) -> Option<String> {
     let sizes = match caches {
         CacheSettings::Split { photon, scene, .. } => [photon.bytes, scene.bytes],
         CacheSettings::Unified(both) => [both.bytes, 0],
     };
-    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.budget().sram_bytes));
+    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.kind().budget().sram_bytes));
     (taken > all).then(|| {
         format!(
-            "cache={caches} takes {taken} bytes, and the chip {} has {all} in all: its traffic is that of a \
-             larger chip",
-            chip.name()
+            "cache={caches} takes {taken} bytes, and the chip {chip} has {all} in all: its traffic is that of a \
+             larger chip"
         )
     })
 }
@@ -147,6 +162,9 @@ impl From<AxisError> for PointError {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_driver::choice::Choice;
+    use photoncard_driver::emulator::EmulatedKind;
+
     use super::*;
 
     #[test]
@@ -157,7 +175,7 @@ mod tests {
             (EmulatedKind::Reference, "photon=1M/128/16,scene=75K/128/4", true),
             (EmulatedKind::Micro, "unified=512K/128/16", true),
         ] {
-            let said = beyond_chip(chip, &caches.parse().unwrap());
+            let said = beyond_chip(&chip.into(), &caches.parse().unwrap());
             assert_eq!(said.is_some_and(|said| said.contains(chip.name())), is_beyond, "{caches}");
         }
     }

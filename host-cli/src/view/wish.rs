@@ -91,7 +91,7 @@ impl Wish {
     /// The first setting that exceeds the budget of a card.
     pub(super) fn check_cards(&self) -> Result<(), RenderError> {
         self.settings.cards.addresses.iter().try_for_each(|address| match address {
-            CardAddress::Emulated { kind, .. } => self.settings.check_budget(&kind.budget()),
+            CardAddress::Emulated { model, .. } => self.settings.check_budget(&model.kind().budget()),
             CardAddress::Remote(_) => Ok(()),
         })
     }

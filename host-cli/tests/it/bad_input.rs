@@ -271,17 +271,22 @@ fn invalid_arguments_of_an_emulator_are_refused() {
 fn an_impossible_chip_is_refused_with_its_field_and_range() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
-    room.write("chip.json", r#"{"gather_queue": 0}"#);
-    let words = ["--chip", "gather_queue is 0; use a number from 1 to"];
-    refused(&room, "scene.gltf", &["--chip", "chip.json"], &words);
-    refused(&room, "scene.gltf", &["--chip", "absent.json"], &["--chip", "it cannot be read"]);
+    room.write("chip.toml", "[memory]\n# No chip gathers without a queue.\ngather_queue = 0\n");
+    let words = ["--card", "chip.toml:3: [memory] gather_queue is 0; use a whole number from 1 to"];
+    refused(&room, "scene.gltf", &["--card", "emulated:chip.toml:2"], &words);
+    refused(
+        &room,
+        "scene.gltf",
+        &["--card", "emulated:absent.toml"],
+        &["--card", "absent.toml cannot be read"],
+    );
     for command in [
         &["prepare", "scene.gltf", "-o", "a.card"][..],
         &["emulate", "--listen", "unix:a"],
         &["card", "info"],
         &["view", "scene.gltf"],
     ] {
-        check_refused(&room.run(&[command, &["--chip", "chip.json"]].concat()), &words, command[0]);
+        check_refused(&room.run(&[command, &["--card", "emulated:chip.toml"]].concat()), &words, command[0]);
     }
 }
 

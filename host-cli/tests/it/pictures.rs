@@ -278,19 +278,19 @@ fn a_view_by_options_equals_that_of_a_camera_there() {
     assert!(pixels("other.gltf", &place) != expected);
 }
 
-/// The chip is that of `docs/chip.json`.
+/// The chip is that of `docs/chip.toml`.
 #[test]
 fn chips_of_a_file_render_the_picture_of_the_reference_chip() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
-    let chip = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/chip.json");
+    let chip = concat!("emulated:", env!("CARGO_MANIFEST_DIR"), "/../docs/chip.toml");
     for options in [&["--tile", "8"][..], &["--irradiance-cache", "on", "--sampling", "combined"]] {
         let options = [options, &["--size", "16x16"]].concat();
         room.rendered(&cornell, &[&["-o", "a.exr"], &options[..]].concat());
-        room.rendered(&cornell, &[&["-o", "b.exr", "--chip", chip], &options[..]].concat());
+        room.rendered(&cornell, &[&["-o", "b.exr", "--card", chip], &options[..]].concat());
         assert!(room.read("a.exr") == room.read("b.exr"), "{options:?}");
     }
-    let info = room.run(&["card", "info", "--chip", chip]);
+    let info = room.run(&["card", "info", "--card", chip]);
     assert_eq!(info.status, Some(0), "{}", info.stderr);
     for line in
         ["sram            524288 bytes", "gather queue    4096 gathers", "dram            67108864 bytes"]

@@ -43,8 +43,8 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     ]
 }
 
-/// Example of a file for `--chip`.
-const CHIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/chip.json");
+/// Card with a chip of a file.
+const CHIP: &str = concat!("emulated:", env!("CARGO_MANIFEST_DIR"), "/../docs/chip.toml:2");
 
 /// Options that no pixel depends on.
 const OTHERS: [&[&str]; 25] = [
@@ -56,7 +56,7 @@ const OTHERS: [&[&str]; 25] = [
     &["--queue", "7"],
     &["--in-flight", "1"],
     &["--card", "emulated-micro:2"],
-    &["--chip", CHIP],
+    &["--card", CHIP],
     &["--card-memory", "1G"],
     &["--verify", "0.5", "--card", "emulated:2"],
     &["--faults", "flips=1e-6"],

@@ -48,8 +48,9 @@ impl Run {
         let (mut counters, mut contents) = (Counters::ZERO, Contents::ZERO);
         let (mut chip, caches) = (EmulatedKind::Reference.emulated().chip(), CacheSettings::default());
         for (&tile, counted) in chosen.iter().zip(&counted.counters) {
-            let rendered = render_tile_of(&mut chip, &mapped.image, Some(&caches), &frame, tile, None)
-                .expect("a sound image");
+            let rendered =
+                render_tile_of(&mut chip, &mapped.image, Some((&caches).into()), &frame, tile, None)
+                    .expect("a sound image");
             assert_eq!(rendered.counters, *counted, "tile {}", tile.id);
             counters.add(&rendered.counters);
             contents.add(&rendered.traffic.contents);

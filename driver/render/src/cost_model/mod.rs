@@ -5,17 +5,22 @@
 //! frame. A [`Cost`] is the number of FLOPs and DRAM bytes of this work in each unit of the chip. A
 //! [`Prediction`] is the speed of a [`Machine`] at such a cost. [`Flops`] are the operations of a measured
 //! run by the constants of Table 7.1; [`arithmetic`] counts those of this firmware. A [`Distribution`] gives
-//! the time of an upload to all chips. `docs/scaling.md` has the formulas.
+//! the time of an upload to all chips, and [`Energy`] the energy of a frame. `docs/scaling.md` has the
+//! formulas.
 
 pub mod arithmetic;
 mod distribution;
+mod energy;
 mod prediction;
+mod rates;
 mod symbols;
 pub mod timing;
 mod workload;
 
 pub use distribution::Distribution;
+pub use energy::Energy;
 pub use prediction::{ChipsNeeded, Machine, Prediction, Resource};
+pub use rates::Rates;
 pub use symbols::{Origin, Symbol, SymbolError, Symbols};
 pub use workload::Workload;
 

@@ -1,16 +1,14 @@
-//! Kinds of emulated chips with the capacities in a JSON file, and the on-chip memory that these need.
+//! Kinds of emulated chips with stated capacities, and the on-chip memory that these need.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::fmt;
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 use photoncard_firmware::card::{Card, MAX_TILES};
 use photoncard_firmware::chip::Chip;
 use photoncard_firmware::gather::REQUEST_BYTES;
 use photoncard_firmware::kind::{
-    ChipKind, Entries, FixedKind, MIN_RECORDS, REFERENCE, Reference, TechniqueMemory, cache_bytes,
+    ChipKind, Entries, FixedKind, MIN_RECORDS, REFERENCE, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::{
@@ -23,15 +21,12 @@ use serde_json::{Value, json};
 use super::emulated::Emulated;
 use super::memory_model::CacheSpec;
 
-/// Maximum size of a file, bytes.
-const MAX_BYTES: u64 = 1 << 16;
 /// Maximum on-chip memory of a kind, bytes. Each emulated chip takes as much host memory.
 const MAX_SRAM: u64 = 16 << 20;
 /// Minimum memory of an emulated card, bytes.
 pub const MIN_DRAM_BYTES: u64 = 1 << 20;
 
-/// Names and ranges of the capacities in a file. A capacity that the file does not state is that of the
-/// reference chip.
+/// Names and ranges of the capacities that can be stated.
 const RANGES: [(&str, RangeInclusive<u64>); 16] = [
     ("sram_bytes", 1..=MAX_SRAM),
     ("dram_bytes", MIN_DRAM_BYTES..=MAX_DRAM_BYTES),
@@ -51,27 +46,24 @@ const RANGES: [(&str, RangeInclusive<u64>); 16] = [
     ("gather_points", MIN_RECORDS as u64..=MAX_TILE_PIXELS as u64),
 ];
 
-/// Error of a file with the capacities of a chip.
-#[derive(Debug, thiserror::Error)]
+/// Stated capacities: values by name.
+pub type Capacities = BTreeMap<String, Value>;
+
+/// Error of stated capacities.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChipError {
-    /// The file cannot be read, or is not text.
-    #[error("it cannot be read: {0}")]
-    Unreadable(#[from] io::Error),
-    /// The file is no JSON object.
-    #[error("it is no JSON object of capacities, which are numbers: {0}")]
-    Syntax(#[from] serde_json::Error),
-    /// A field of the file is not the name of a capacity.
-    #[error("{name:?} is none of {}", RANGES.map(|(name, _)| name).join(", "))]
+    /// A name is none of a capacity.
+    #[error("{name:?} is none of the capacities {}", RANGES.map(|(name, _)| name).join(", "))]
     Unknown {
-        /// Name of the field.
+        /// The name.
         name: String,
     },
-    /// A capacity is out of its range.
-    #[error("{name} is {value}; use a number from {least} to {most}")]
+    /// A capacity is out of its range, or no number.
+    #[error("{name} is {value}; use a whole number from {least} to {most}")]
     OutOfRange {
         /// Name of the capacity.
         name: &'static str,
-        /// Value in the file.
+        /// Stated value.
         value: Value,
         /// Smallest value.
         least: u64,
@@ -88,45 +80,116 @@ pub enum ChipError {
         /// Description of the values that are possible.
         rule: String,
     },
+    /// A capacity is missing.
+    #[error("the capacities are incomplete: {0}")]
+    Incomplete(String),
+    /// The parts of on-chip memory exceed it.
+    #[error("sram_bytes is {most}, and its parts take {}: {parts}; use as much, or lower a capacity", parts.sum())]
+    TooLarge {
+        /// On-chip memory, bytes.
+        most: u32,
+        /// Parts of it.
+        parts: SramParts,
+    },
+}
+
+impl ChipError {
+    /// Name of the capacity that the error is about.
+    pub fn capacity(&self) -> &str {
+        match self {
+            Self::Unknown { name } => name,
+            Self::OutOfRange { name, .. } | Self::Contradictory { name, .. } => name,
+            Self::Incomplete(_) | Self::TooLarge { .. } => "sram_bytes",
+        }
+    }
+}
+
+/// Parts of the on-chip memory that firmware takes, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SramParts {
+    /// Lines of the photon map's cache.
+    pub photon_cache: usize,
+    /// Lines of the scene's cache.
+    pub scene_cache: usize,
+    /// Tags of both caches.
+    pub cache_tags: usize,
+    /// Call stack.
+    pub stack: usize,
+    /// Gather queue, and tables of what waits in card memory.
+    pub reordering: usize,
+    /// Irradiance records of all tiles in flight.
+    pub irradiance_cache: usize,
+    /// Direction tables of gather points.
+    pub importance_sampling: usize,
+    /// Sums of pixels, and the other buffers.
+    pub others: usize,
+}
+
+impl SramParts {
+    /// Names and sizes of the parts.
+    fn rows(&self) -> [(&'static str, usize); 8] {
+        [
+            ("photon cache", self.photon_cache),
+            ("scene cache", self.scene_cache),
+            ("cache tags", self.cache_tags),
+            ("stack", self.stack),
+            ("gathers that wait", self.reordering),
+            ("irradiance records", self.irradiance_cache),
+            ("tables of directions", self.importance_sampling),
+            ("other buffers", self.others),
+        ]
+    }
+
+    /// Sum of the parts, bytes.
+    pub fn sum(&self) -> usize {
+        self.rows().iter().map(|(_, bytes)| bytes).sum()
+    }
+}
+
+impl fmt::Display for SramParts {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.rows().map(|(name, bytes)| format!("{name} {bytes}")).join(" + "))
+    }
 }
 
 impl Emulated {
-    /// Reads the capacities of a kind of chip from a JSON file.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or a capacity is unknown, out of its range or contradicts others.
-    pub fn read(path: &Path) -> Result<Self, ChipError> {
-        let mut text = String::new();
-        File::open(path)?.take(MAX_BYTES).read_to_string(&mut text)?;
-        Self::from_json(&text)
-    }
-
-    /// Reads the capacities of a kind of chip from a JSON object. Capacities that the object does not state
-    /// are those of the reference chip; but no block waits if the stated capacities have no room for it.
+    /// Replaces the stated capacities. But no block waits, unless it is stated, if the capacities have no
+    /// room for it.
     ///
     /// # Errors
     /// The first capacity that is unknown, out of its range or contradicts others.
-    pub fn from_json(text: &str) -> Result<Self, ChipError> {
-        let stated: BTreeMap<String, Value> = serde_json::from_str(text)?;
-        let states_waiting = stated.contains_key("waiting_blocks");
-        let mut capacities = Self::like::<Reference>().to_json();
+    pub fn with_capacities(self, stated: &Capacities) -> Result<Self, ChipError> {
+        let mut capacities = self.to_json();
         for (name, value) in stated {
-            let Some((name, range)) = RANGES.into_iter().find(|(known, _)| *known == name) else {
-                return Err(ChipError::Unknown { name });
+            let Some((name, range)) = RANGES.into_iter().find(|(known, _)| known == name) else {
+                return Err(ChipError::Unknown { name: name.clone() });
             };
             if !value.as_u64().is_some_and(|number| range.contains(&number)) {
                 let (least, most) = range.into_inner();
-                return Err(ChipError::OutOfRange { name, value, least, most });
+                return Err(ChipError::OutOfRange { name, value: value.clone(), least, most });
             }
-            capacities[name] = value;
+            capacities[name] = value.clone();
         }
-        let points = serde_json::from_value(capacities["gather_points"].take())?;
-        let mut kind = Self { budget: serde_json::from_value(capacities)?, points };
-        if !states_waiting && (kind.points_of_block() > MAX_WAITING_POINTS || kind.buckets() == 0) {
+        let mut kind = Self::of(capacities)?;
+        if !stated.contains_key("waiting_blocks")
+            && (kind.points_of_block() > MAX_WAITING_POINTS || kind.buckets() == 0)
+        {
             kind.budget.waiting_blocks = 0;
         }
         kind.check()?;
         Ok(kind)
+    }
+
+    /// Names of the capacities that can be stated.
+    pub fn capacities() -> impl Iterator<Item = &'static str> {
+        RANGES.iter().map(|(name, _)| *name)
+    }
+
+    /// Kind with the capacities in a JSON object that has all of them.
+    fn of(mut capacities: Value) -> Result<Self, ChipError> {
+        let incomplete = |error: serde_json::Error| ChipError::Incomplete(error.to_string());
+        let points = serde_json::from_value(capacities["gather_points"].take()).map_err(incomplete)?;
+        Ok(Self { budget: serde_json::from_value(capacities).map_err(incomplete)?, points })
     }
 
     /// JSON object with all capacities.
@@ -169,12 +232,8 @@ impl Emulated {
             let rule = format!("at least {irradiance_records}, the number of irradiance_records");
             return contradictory("gather_points", self.points as u32, &rule);
         }
-        let (bytes, most) = (self.sram_bytes(), self.budget.sram_bytes);
-        if bytes > most as usize {
-            let rule = format!("at least {bytes}, which buffers, caches and stack take");
-            return contradictory("sram_bytes", most, &rule);
-        }
-        Ok(())
+        let (parts, most) = (self.sram_parts(), self.budget.sram_bytes);
+        if parts.sum() > most as usize { Err(ChipError::TooLarge { most, parts }) } else { Ok(()) }
     }
 
     /// Maximum number of points of a block whose gathers wait.
@@ -190,6 +249,21 @@ impl Emulated {
     /// On-chip memory of the firmware, including caches and stack, bytes.
     pub fn sram_bytes(&self) -> usize {
         self.sizes()[0] + cache_bytes(&self.budget) + self.budget.stack_bytes as usize
+    }
+
+    /// Parts of the on-chip memory of the firmware. Their sum is [`Self::sram_bytes`].
+    pub fn sram_parts(&self) -> SramParts {
+        let [all, reordering, irradiance_cache, importance_sampling, _] = self.sizes();
+        SramParts {
+            photon_cache: self.budget.photon_cache_bytes as usize,
+            scene_cache: self.budget.scene_cache_bytes as usize,
+            cache_tags: tag_bytes(&self.budget),
+            stack: self.budget.stack_bytes as usize,
+            reordering,
+            irradiance_cache,
+            importance_sampling,
+            others: all - reordering - irradiance_cache - importance_sampling,
+        }
     }
 
     /// On-chip memory, bytes, that reordering, irradiance cache and importance sampling each add.
@@ -306,10 +380,16 @@ mod tests {
 
     use super::*;
 
+    /// Reference chip with the capacities of a JSON object.
+    fn read(stated: Value) -> Result<Emulated, ChipError> {
+        Emulated::like::<Reference>().with_capacities(&serde_json::from_value(stated).unwrap())
+    }
+
     fn check_sizes<K: FixedKind>() {
         let kind = Emulated::like::<K>();
         assert_eq!((kind.sram_bytes(), kind.techniques()), (sram_bytes::<K>(), Chip::<K>::TECHNIQUES));
-        assert_eq!(Emulated::from_json(&kind.to_json().to_string()).unwrap(), kind);
+        assert_eq!(kind.sram_parts().sum(), kind.sram_bytes());
+        assert_eq!(read(kind.to_json()), Ok(kind));
     }
 
     #[test]
@@ -317,7 +397,7 @@ mod tests {
         check_sizes::<Reference>();
         check_sizes::<Large>();
         check_sizes::<Micro>();
-        assert_eq!(Emulated::from_json("{}").unwrap(), Emulated::like::<Reference>());
+        assert_eq!(read(json!({})), Ok(Emulated::like::<Reference>()));
         let names = RANGES.map(|(name, _)| name);
         let fields = Emulated::like::<Reference>().to_json();
         assert!(fields.as_object().unwrap().keys().all(|name| names.contains(&name.as_str())));
@@ -325,39 +405,43 @@ mod tests {
 
     #[test]
     fn impossible_chips_are_refused_with_field_and_range() {
-        for (text, words) in [
-            ("", ["no JSON object", "EOF"]),
-            ("[1]", ["no JSON object", "a map"]),
-            (r#"{"pixels": 1}"#, ["\"pixels\" is none of", "tile_pixels"]),
-            (r#"{"gather_queue": 0}"#, ["gather_queue is 0", "1 to 1048576"]),
-            (r#"{"gather_queue": -1}"#, ["gather_queue is -1", "1 to 1048576"]),
-            (r#"{"gather_queue": "9"}"#, ["gather_queue is \"9\"", "1 to 1048576"]),
-            (r#"{"in_flight": 4294967297}"#, ["in_flight is 4294967297", "1 to 8"]),
-            (r#"{"neighbors": 257}"#, ["neighbors is 257", "2 to 256"]),
-            (r#"{"scene_cache_bytes": 1000}"#, ["scene_cache_bytes is 1000", "multiple of 512"]),
-            (r#"{"irradiance_records": 100}"#, ["irradiance_records is 100", "power of two"]),
-            (r#"{"in_flight": 5}"#, ["in_flight is 5", "at most 4"]),
-            (r#"{"tile_pixels": 8192, "waiting_blocks": 64}"#, ["waiting_blocks is 64", "at most 4096"]),
-            (r#"{"gather_queue": 4, "waiting_blocks": 1}"#, ["waiting_blocks is 1", "8 gathers"]),
-            (r#"{"gather_points": 256}"#, ["gather_points is 256", "at least 512"]),
-            (r#"{"gather_queue": 1000000}"#, ["sram_bytes is 1048576", "buffers, caches and stack"]),
+        for (stated, words) in [
+            (json!({"pixels": 1}), ["\"pixels\" is none of", "tile_pixels"]),
+            (json!({"gather_queue": 0}), ["gather_queue is 0", "1 to 1048576"]),
+            (json!({"gather_queue": -1}), ["gather_queue is -1", "1 to 1048576"]),
+            (json!({"gather_queue": "9"}), ["gather_queue is \"9\"", "1 to 1048576"]),
+            (json!({"in_flight": 4_294_967_297_u64}), ["in_flight is 4294967297", "1 to 8"]),
+            (json!({"neighbors": 257}), ["neighbors is 257", "2 to 256"]),
+            (json!({"scene_cache_bytes": 1000}), ["scene_cache_bytes is 1000", "multiple of 512"]),
+            (json!({"irradiance_records": 100}), ["irradiance_records is 100", "power of two"]),
+            (json!({"in_flight": 5}), ["in_flight is 5", "at most 4"]),
+            (json!({"tile_pixels": 8192, "waiting_blocks": 64}), ["waiting_blocks is 64", "at most 4096"]),
+            (json!({"gather_queue": 4, "waiting_blocks": 1}), ["waiting_blocks is 1", "8 gathers"]),
+            (json!({"gather_points": 256}), ["gather_points is 256", "at least 512"]),
+            (json!({"gather_queue": 1_000_000}), ["sram_bytes is 1048576", "photon cache 131072 + "]),
         ] {
-            let said = Emulated::from_json(text).unwrap_err().to_string();
-            assert!(words.iter().all(|word| said.contains(word)), "{text}: {said}");
+            let said = read(stated.clone()).unwrap_err().to_string();
+            assert!(words.iter().all(|word| said.contains(word)), "{stated}: {said}");
         }
-        let without_room = Emulated::from_json(r#"{"gather_queue": 4}"#).unwrap();
-        assert_eq!(without_room.budget.waiting_blocks, 0);
-        assert!(matches!(Emulated::read("/dev/zero".as_ref()), Err(ChipError::Syntax(_))));
-        assert!(matches!(Emulated::read("absent".as_ref()), Err(ChipError::Unreadable(_))));
+        assert_eq!(read(json!({"gather_queue": 4})).unwrap().budget.waiting_blocks, 0);
+    }
+
+    #[test]
+    fn the_parts_in_a_refusal_add_up_to_the_stated_sum() {
+        let refused = read(json!({"gather_queue": 100_000})).unwrap_err();
+        let said = refused.to_string();
+        let (sum, parts) = said.split_once("parts take ").unwrap().1.split_once(": ").unwrap();
+        let sum: usize = sum.parse().unwrap();
+        let parts = parts.split_once(';').unwrap().0.split(" + ");
+        let bytes = parts.map(|part| part.rsplit_once(' ').unwrap().1.parse::<usize>().unwrap());
+        assert_eq!(bytes.sum::<usize>(), sum, "{said}");
+        // The sum fits itself: the buffers do not depend on the memory that they are in.
+        let fitting = json!({"gather_queue": 100_000, "sram_bytes": sum});
+        assert_eq!(read(fitting).unwrap().sram_bytes(), sum);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
-
-        #[test]
-        fn texts_are_read_or_refused(text in ".*") {
-            drop(Emulated::from_json(&text));
-        }
 
         /// Half of the tested capacities are near the ends of their ranges.
         #[test]
@@ -370,9 +454,9 @@ mod tests {
                 let near = if number % 2 == 0 { range.start() + step } else { range.end() - step.min(*range.end()) };
                 fields[*name] = (if is_near { near } else { number >> (number % 64) }).into();
             }
-            if let Ok(kind) = Emulated::from_json(&fields.to_string()) {
+            if let Ok(kind) = read(fields) {
                 prop_assert!(kind.sram_bytes() <= kind.budget.sram_bytes as usize);
-                prop_assert!(Emulated::from_json(&kind.to_json().to_string()).unwrap() == kind);
+                prop_assert!(read(kind.to_json()) == Ok(kind));
                 drop(kind.chip());
             }
         }

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use super::dram::EmulatedDram;
 use super::measured::Measured;
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use super::reuse::{Delivered, Reuse, Reused};
 use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
@@ -30,6 +31,41 @@ pub struct RenderedTile {
     pub counters: Counters,
     /// Memory traffic; zero if the memory is not modelled.
     pub traffic: MemoryTraffic,
+    /// Reuse of cache lines, if it is counted.
+    pub reuse: Option<Box<Reuse>>,
+}
+
+/// Model of the memory of chips that render tiles.
+#[derive(Clone, Copy, Debug)]
+pub struct TileMemory<'a> {
+    /// Caches between chip and DRAM.
+    pub caches: &'a CacheSettings,
+    /// True to count the reuse of cache lines, which takes time.
+    pub has_reuse: bool,
+}
+
+impl<'a> From<&'a CacheSettings> for TileMemory<'a> {
+    fn from(caches: &'a CacheSettings) -> Self {
+        Self { caches, has_reuse: false }
+    }
+}
+
+impl TileMemory<'_> {
+    /// Puts the model over a memory, and returns the counts that the model delivers.
+    fn over<'m, M: CardMemory + MeasuredMemory + Send + 'm>(&self, memory: M) -> (Measured<'m>, Delivered) {
+        let delivered = Delivered::default();
+        let cached = self.caches.over(memory);
+        let measured = match self.has_reuse {
+            true => Measured::new(Reused::new(cached, self.caches, delivered.clone())),
+            false => Measured::new(cached),
+        };
+        (measured, delivered)
+    }
+
+    /// Takes the counts of a model that was dropped.
+    fn reuse(&self, delivered: &Delivered, traffic: &MemoryTraffic) -> Option<Box<Reuse>> {
+        self.has_reuse.then(|| Box::new(delivered.take(traffic)))
+    }
 }
 
 impl RenderedTile {
@@ -39,7 +75,7 @@ impl RenderedTile {
         let mut sums = Vec::with_capacity(pixels.len() * sums_of_pixel(frame.layers) as usize);
         pixels.iter().for_each(|pixel| sums.extend_from_slice(pixel.light.sums(frame)));
         let views = pixels.into_iter().map(|pixel| pixel.view).collect();
-        Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
+        Self { sums, views, counters, traffic: MemoryTraffic::ZERO, reuse: None }
     }
 
     /// Values of the pixels, row by row. `format` is the format of the frame's sums.
@@ -66,7 +102,7 @@ impl From<Fault> for DirectError {
     }
 }
 
-/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `caches`, the
+/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `model`, the
 /// memory is modelled, and caches are empty at the beginning of each tile. `is_stopped` is polled before each
 /// tile.
 ///
@@ -78,14 +114,14 @@ pub fn render_tiles_apart(
     image: &CardImage,
     frame: &FrameParameters,
     tiles: &[Tile],
-    caches: Option<&CacheSettings>,
+    model: Option<TileMemory>,
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<RenderedTile>, DirectError> {
     let render_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if is_stopped() {
             return Err(DirectError::Stopped);
         }
-        Ok(render_tile_of(chip, image, caches, frame, tile, None)?)
+        Ok(render_tile_of(chip, image, model, frame, tile, None)?)
     };
     let new_chip = || kind.emulated().chip();
     pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
@@ -93,7 +129,7 @@ pub fn render_tiles_apart(
 
 /// Renders tiles on one chip of a kind with modelled memory, as many at a time as the frame and the chip
 /// allow. `take` is called with each finished tile, without its traffic, and returns whether to continue.
-/// Returns the traffic of all tiles.
+/// Returns the traffic of all tiles, and the reuse of cache lines if it is counted.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for a tile.
@@ -102,36 +138,42 @@ pub fn render_tiles_in_flight(
     image: &CardImage,
     frame: &FrameParameters,
     tiles: &[Tile],
-    caches: &CacheSettings,
+    model: TileMemory,
     take: &mut dyn FnMut(&Tile, RenderedTile) -> bool,
-) -> Result<MemoryTraffic, Fault> {
+) -> Result<(MemoryTraffic, Option<Box<Reuse>>), Fault> {
     let (scene, lines) = image.view();
     let chip = &mut kind.emulated().chip();
     let dram = EmulatedDram::lent(lines, kind.budget().dram_bytes);
     chip.begin_frame(frame, scene.header.lines..dram.lines());
-    let mut memory = Measured::new(caches.over(dram));
+    let (mut memory, delivered) = model.over(dram);
     let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
     render_tiles(chip, job, tiles, take)?;
-    Ok(memory.traffic())
+    let traffic = memory.traffic();
+    drop(memory);
+    let reuse = model.reuse(&delivered, &traffic);
+    Ok((traffic, reuse))
 }
 
-/// Renders a tile from a card image, like [`render_tile`]. With `caches`, the memory is modelled.
+/// Renders a tile from a card image, like [`render_tile`]. With `model`, the memory is modelled.
 ///
 /// # Errors
 /// As [`render_tile`].
 pub fn render_tile_of(
     chip: &mut EmulatedChip,
     image: &CardImage,
-    caches: Option<&CacheSettings>,
+    model: Option<TileMemory>,
     frame: &FrameParameters,
     tile: Tile,
     outlet: Option<&mut (dyn GatherOutlet + 'static)>,
 ) -> Result<RenderedTile, Fault> {
     let (scene, lines) = image.view();
-    match caches {
-        None => render_tile(chip, &scene, EmulatedDram::lent(lines, 0), frame, tile, outlet),
-        Some(caches) => render_tile(chip, &scene, Measured::new(caches.over(lines)), frame, tile, outlet),
-    }
+    let Some(model) = model else {
+        return render_tile(chip, &scene, EmulatedDram::lent(lines, 0), frame, tile, outlet);
+    };
+    let (memory, delivered) = model.over(lines);
+    let rendered = render_tile(chip, &scene, memory, frame, tile, outlet)?;
+    let reuse = model.reuse(&delivered, &rendered.traffic);
+    Ok(RenderedTile { reuse, ..rendered })
 }
 
 /// Renders a tile on a chip that reads `memory`. With an `outlet`, the photon gathers of the pixels are

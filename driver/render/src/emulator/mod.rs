@@ -7,6 +7,7 @@ mod dram;
 mod emulated;
 mod measured;
 pub mod memory_model;
+pub mod reuse;
 mod tile_lines;
 pub mod trace;
 mod traced;
@@ -27,7 +28,7 @@ use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
-pub use self::chip_file::{ChipError, MIN_DRAM_BYTES};
+pub use self::chip_file::{Capacities, ChipError, MIN_DRAM_BYTES, SramParts};
 use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};

@@ -328,13 +328,13 @@ impl CardSet {
         each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
     }
 
-    /// Caches of the first emulated card's kind, or of the reference chip if no card is emulated.
+    /// Caches of the first emulated card's model, or of the reference chip if no card is emulated.
     pub fn own_caches(&self) -> CacheSettings {
-        let kind = self.addresses.iter().find_map(|address| match address {
-            CardAddress::Emulated { kind, .. } => Some(*kind),
+        let caches = self.addresses.iter().find_map(|address| match address {
+            CardAddress::Emulated { model, .. } => Some(model.caches()),
             CardAddress::Remote(_) => None,
         });
-        kind.unwrap_or(EmulatedKind::Reference).caches()
+        caches.unwrap_or_else(|| EmulatedKind::Reference.caches())
     }
 }
 

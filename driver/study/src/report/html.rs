@@ -45,9 +45,16 @@ pub(crate) enum Block {
         /// Path of the linked page, relative to this one.
         target: String,
     },
-    /// A table. It is also stored in the file `<name>.csv` beside the page.
+    /// A table. It is also stored in the file `<name>.csv` beside the page, and in `<name>.json` if it is
+    /// [data](Table::is_data).
     Table {
         /// Name of the file without its extension.
+        name: String,
+        table: Table,
+    },
+    /// A table of files alone, to which the page links.
+    Data {
+        /// Name of the files without their extensions.
         name: String,
         table: Table,
     },
@@ -116,12 +123,15 @@ impl Report {
 }
 
 impl Block {
-    /// Name and content of the block's file beside the page; `None` if it has no file.
-    pub(super) fn file(&self) -> Option<(String, String)> {
+    /// Names and contents of the block's files beside the page.
+    pub(super) fn files(&self) -> Vec<(String, String)> {
         match self {
-            Self::Paragraph(_) | Self::Link { .. } => None,
-            Self::Table { name, table } => Some((format!("{name}.csv"), table.to_csv())),
-            Self::Plot { name, plot } => Some((format!("{name}.svg"), plot.to_svg())),
+            Self::Paragraph(_) | Self::Link { .. } => Vec::new(),
+            Self::Table { name, table } | Self::Data { name, table } => {
+                let json = table.is_data().then(|| (format!("{name}.json"), table.to_json()));
+                std::iter::once((format!("{name}.csv"), table.to_csv())).chain(json).collect()
+            }
+            Self::Plot { name, plot } => vec![(format!("{name}.svg"), plot.to_svg())],
         }
     }
 
@@ -131,10 +141,11 @@ impl Block {
             Self::Link { text, target } => {
                 format!("<p><a href=\"{}\">{}</a></p>\n", escape(target), escape(text))
             }
+            Self::Data { name, table } => format!("<p>{}</p>\n", caption(name, table)),
             Self::Table { name, table } => {
-                let caption = format!("<strong>{}</strong> {}", escape(table.title()), link(name, "csv"));
                 format!(
-                    "<figure>\n<figcaption>{caption}</figcaption>\n{}</figure>\n",
+                    "<figure>\n<figcaption>{}</figcaption>\n{}</figure>\n",
+                    caption(name, table),
                     scrolling("table", table.title(), &table.to_html())
                 )
             }
@@ -175,6 +186,12 @@ impl Provenance {
 
 fn paragraph(text: &str) -> String {
     format!("<p>{}</p>\n", escape(text))
+}
+
+/// Title of a table, with links to its files.
+fn caption(name: &str, table: &Table) -> String {
+    let json = if table.is_data() { format!(" {}", link(name, "json")) } else { String::new() };
+    format!("<strong>{}</strong> {}{json}", escape(table.title()), link(name, "csv"))
 }
 
 fn link(name: &str, extension: &str) -> String {

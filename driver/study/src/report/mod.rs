@@ -63,9 +63,9 @@ pub enum ReportError {
     Output(#[from] OutputError),
 }
 
-/// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, each plot as
-/// `<name>.svg`, and finally `index.html`. Existing files with these names are replaced, each atomically;
-/// other files are left unchanged.
+/// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, data as
+/// `<name>.json` too, each plot as `<name>.svg`, and finally `index.html`. Existing files with these names
+/// are replaced, each atomically; other files are left unchanged.
 ///
 /// # Errors
 /// If a name has other characters than letters, digits, `-` and `.`, or two files would have names that are
@@ -73,13 +73,13 @@ pub enum ReportError {
 pub(crate) fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {
-        if let Block::Table { name, .. } | Block::Plot { name, .. } = block
+        if let Block::Table { name, .. } | Block::Data { name, .. } | Block::Plot { name, .. } = block
             && !is_portable(name)
         {
             return Err(ReportError::BadName { name: name.clone() });
         }
     }
-    let files: Vec<_> = blocks().filter_map(Block::file).collect();
+    let files: Vec<_> = blocks().flat_map(Block::files).collect();
     let mut names = HashSet::new();
     for (file, _) in &files {
         if !names.insert(file.to_ascii_lowercase()) {

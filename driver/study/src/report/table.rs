@@ -1,6 +1,8 @@
-//! Tables: CSV for programs, HTML for people.
+//! Tables: CSV and JSON for programs, HTML for people.
 
 use std::fmt::Write;
+
+use serde_json::{Map, Value, json};
 
 use super::markup::escape;
 use super::number;
@@ -19,6 +21,8 @@ pub(crate) struct Table {
     title: String,
     columns: Vec<Column>,
     rows: Vec<Vec<Cell>>,
+    /// Columns that only files have, with the cell of each row.
+    of_files: Vec<(Column, Vec<Cell>)>,
 }
 
 /// Head of a column.
@@ -91,6 +95,18 @@ impl Cell {
         }
     }
 
+    /// Value of the cell in JSON, without its half-width.
+    fn json(&self) -> Value {
+        match self {
+            Self::Empty => Value::Null,
+            Self::Text(text) => json!(text),
+            Self::Integer(value) => {
+                i64::try_from(*value).map_or_else(|_| json!(value.to_string()), Value::from)
+            }
+            Self::Real { value, .. } => json!(value),
+        }
+    }
+
     fn html(&self) -> String {
         match self {
             Self::Empty => String::new(),
@@ -144,7 +160,22 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 impl Table {
     /// Creates a table without rows.
     pub(crate) fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
-        Self { title: title.into(), columns, rows: Vec::new() }
+        Self { title: title.into(), columns, rows: Vec::new(), of_files: Vec::new() }
+    }
+
+    /// Adds a column that files have and pages do not.
+    ///
+    /// # Panics
+    /// If there is not one cell per row.
+    pub(crate) fn add_to_files(&mut self, column: Column, cells: Vec<Cell>) {
+        assert_eq!(cells.len(), self.rows.len(), "a column of the table '{}'", self.title);
+        self.of_files.push((column, cells));
+    }
+
+    /// Returns whether columns make each row of a file complete without the page. Such a table has a JSON
+    /// file as well.
+    pub(crate) fn is_data(&self) -> bool {
+        !self.of_files.is_empty()
     }
 
     /// Adds a row at the end.
@@ -166,28 +197,51 @@ impl Table {
     /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are
     /// written `NaN`, `inf` and `-inf`.
     pub(crate) fn to_csv(&self) -> String {
+        let mut records = vec![self.header()];
+        records.extend(self.records().map(|record| record.iter().map(Cell::csv).collect()));
+        csv_of(&records).unwrap_or_default()
+    }
+
+    /// Encodes the rows of [`Self::to_csv`] as a JSON array of objects. A key is the head of a column.
+    /// Numbers are numbers; cells without a value, and values that are not finite, are `null`.
+    pub(crate) fn to_json(&self) -> String {
+        let header = self.header();
+        let object = |record: Vec<Cell>| -> Map<String, Value> {
+            header.iter().cloned().zip(record.iter().map(Cell::json)).collect()
+        };
+        let rows: Vec<_> = self.records().map(object).collect();
+        format!("{:#}\n", json!(rows))
+    }
+
+    /// Heads of the columns of a file: `name (unit)`.
+    fn header(&self) -> Vec<String> {
+        let mut header = Vec::new();
+        for (index, Column { name, unit }) in self.columns.iter().enumerate() {
+            let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+            header.push(format!("{name}{unit}"));
+            if self.has_half_width(index) {
+                header.push(format!("{name} half-width{unit}"));
+            }
+        }
+        header.extend(self.of_files.iter().map(|(column, _)| column.name.clone()));
+        header
+    }
+
+    /// Cells of each row of a file, of which each has one value.
+    fn records(&self) -> impl Iterator<Item = Vec<Cell>> {
         let with_half_width: Vec<bool> =
             (0..self.columns.len()).map(|column| self.has_half_width(column)).collect();
-        let mut header = Vec::new();
-        for (column, with_half_width) in self.columns.iter().zip(&with_half_width) {
-            let unit = if column.unit.is_empty() { String::new() } else { format!(" ({})", column.unit) };
-            header.push(format!("{}{unit}", column.name));
-            if *with_half_width {
-                header.push(format!("{} half-width{unit}", column.name));
-            }
-        }
-        let mut records = vec![header];
-        for row in &self.rows {
+        self.rows.iter().enumerate().map(move |(index, row)| {
             let mut record = Vec::new();
             for (cell, with_half_width) in row.iter().zip(&with_half_width) {
-                record.push(cell.csv());
+                record.push(cell.clone());
                 if *with_half_width {
-                    record.push(cell.half_width().map_or_else(String::new, number::full));
+                    record.push(cell.half_width().into());
                 }
             }
-            records.push(record);
-        }
-        csv_of(&records).unwrap_or_default()
+            record.extend(self.of_files.iter().map(|(_, cells)| cells[index].clone()));
+            record
+        })
     }
 
     /// Encodes the table as an HTML element `table`, without its title. Integers are written in full, other
@@ -274,6 +328,27 @@ mod tests {
         let mut table = Table::new("", vec![Column::new("only", "")]);
         table.push(vec![Cell::Empty]);
         assert_eq!(parse(&table.to_csv()), [["only"], [""]]);
+    }
+
+    #[test]
+    fn json_has_the_rows_of_the_csv() {
+        let mut table = nasty();
+        table.add_to_files(Column::new("seed", ""), vec![1.into(), 2.into(), Cell::Empty]);
+        let records = parse(&table.to_csv());
+        let rows: Vec<Map<String, Value>> = serde_json::from_str(&table.to_json()).unwrap();
+        assert_eq!(rows.len() + 1, records.len());
+        for (row, record) in rows.iter().zip(&records[1..]) {
+            assert_eq!(row.len(), record.len());
+            for (name, text) in records[0].iter().zip(record) {
+                match &row[name] {
+                    Value::Null => assert!(text.is_empty() || text == "NaN", "{name}: {text}"),
+                    Value::String(value) => assert_eq!(value, text),
+                    number => assert_eq!(number.as_f64(), text.parse().ok(), "{name}"),
+                }
+            }
+        }
+        assert_eq!(rows[1]["seed"], json!(2));
+        assert!(!table.to_html().contains("seed") && table.is_data() && !nasty().is_data());
     }
 
     #[test]

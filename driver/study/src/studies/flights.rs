@@ -14,32 +14,55 @@ use super::super::report::{Block, Table};
 use super::super::scale::Scale;
 use super::present::{GIGA, SCENES, columns, table, text};
 
-/// A kind of chip, its number of tiles in flight, and its scene cache.
+/// A kind of chip, its number of tiles in flight, and its caches.
 #[derive(Clone, Copy)]
 pub(super) struct Setup {
     chip: EmulatedKind,
     in_flight: u32,
-    /// Size of the scene cache, bytes.
-    scene_cache: u32,
+    caches: CacheSettings,
 }
 
 /// The reference chip with one tile in flight: it empties its gather queue at the end of each tile.
-const ON_REFERENCE: Setup =
-    Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes };
+const ON_REFERENCE: Setup = Setup {
+    chip: EmulatedKind::Reference,
+    in_flight: 1,
+    caches: with_scene_cache(REFERENCE.scene_cache_bytes),
+};
 /// The large chip with the maximum number of tiles in flight.
-pub(super) const LARGE_IN_FLIGHT: Setup =
-    Setup { chip: EmulatedKind::Large, in_flight: LARGE.in_flight, scene_cache: LARGE.scene_cache_bytes };
+pub(super) const LARGE_IN_FLIGHT: Setup = Setup {
+    chip: EmulatedKind::Large,
+    in_flight: LARGE.in_flight,
+    caches: with_scene_cache(LARGE.scene_cache_bytes),
+};
 /// The large chip with one tile in flight.
 const ON_LARGE: Setup = Setup { in_flight: 1, ..LARGE_IN_FLIGHT };
-const SETUPS: [Setup; 3] = [ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
+
+/// The nominal cache of the photon map, and a cache of the scene with a size in bytes.
+const fn with_scene_cache(bytes: u32) -> CacheSettings {
+    CacheSettings::Split {
+        photon: CacheSpec::PHOTON,
+        scene: CacheSpec { bytes, ..CacheSpec::SCENE },
+        by_work: None,
+    }
+}
+
+/// Setups of the published chips, or those of the scale's chip: one tile in flight, and as many as it can
+/// have.
+fn setups(scale: &Scale) -> Vec<Setup> {
+    if scale.model.is_none() {
+        return vec![ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
+    }
+    let alone = Setup { chip: scale.chip(), in_flight: 1, caches: scale.caches() };
+    let most = scale.chip().budget().in_flight;
+    let several = (most > 1).then_some(Setup { in_flight: most, ..alone });
+    std::iter::once(alone).chain(several).collect()
+}
 
 impl Setup {
     /// Point that renders all tiles of the frame with this setup.
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
         let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
-        let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };
-        let caches = CacheSettings::Split { photon: CacheSpec::PHOTON, scene: scene_cache, by_work: None };
-        scale.on_one_chip(scene, settings, self.chip, caches)
+        scale.on_one_chip(scene, settings, self.chip, self.caches)
     }
 }
 
@@ -49,7 +72,7 @@ fn naive(scale: &Scale, scene: &str) -> Point {
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let of_scene = |(scene, _): (&str, _)| {
-        let setups = SETUPS.map(|setup| setup.point(scale, scene, scale.all_on()));
+        let setups = setups(scale).into_iter().map(|setup| setup.point(scale, scene, scale.all_on()));
         std::iter::once(naive(scale, scene)).chain(setups).collect::<Vec<_>>()
     };
     SCENES.into_iter().flat_map(of_scene).collect()
@@ -72,7 +95,7 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
     let mut rows = Table::new(title, columns(&heads));
     for (scene, name) in SCENES {
         let naive = results.traffic(&naive(scale, scene));
-        for setup in SETUPS {
+        for setup in setups(scale) {
             let measured = results.traffic(&setup.point(scale, scene, scale.all_on()));
             let [map, of_scene, both] =
                 [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()]

@@ -8,7 +8,7 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{Block, Figure, Table, slug};
 use super::super::sample::{Estimate, Ratio};
-use super::super::scale::{Scale, WIDEST_TILE};
+use super::super::scale::Scale;
 use super::flights::LARGE_IN_FLIGHT;
 use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, key, say, table, text};
 
@@ -30,7 +30,7 @@ const LINES: [Line; 4] = [
         let settings = scale.settings(GatherOrder::Sort).with(|s| {
             s.photons.count = photons;
             s.photons.layout = PhotonLayout::Lines;
-            s.schedule.tile = Some(WIDEST_TILE);
+            s.schedule.tile = Some(scale.widest_tile());
         });
         scale.traffic(scene, settings)
     }),

@@ -10,8 +10,9 @@ use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
 use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::Point;
-use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YScale};
+use super::super::report::{self, Block, Cell, Column, Figure, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
+use super::super::symbol_axes::SymbolAxes;
 use super::arithmetic::{self, CountedFrame};
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
 use super::present::{
@@ -104,8 +105,7 @@ pub(super) fn symbols(scale: &Scale) -> Symbols {
 }
 
 /// Frames with the counts of Table 7.1: one naive, one with all techniques.
-fn table_frames(machine: Machine) -> [Frame; 2] {
-    let nominal = Symbols::NOMINAL;
+fn table_frames(nominal: Symbols, machine: Machine) -> [Frame; 2] {
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
     let map = PhotonMapSize { photons: nominal.photons as u64, bytes: nominal.photon_map_bytes() as u64 };
     [
@@ -134,7 +134,7 @@ fn table_frames(machine: Machine) -> [Frame; 2] {
 fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
     let mut frames = Vec::new();
     if scale.is_nominal() {
-        frames.extend(table_frames(scale.machine));
+        frames.extend(table_frames(Symbols::NOMINAL, scale.machine));
     }
     for (scene, name) in SCENES {
         let kinds = [("naive", naive(scale, scene)), ("all techniques", all_on(scale, scene))];
@@ -185,8 +185,10 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     if scale.is_nominal() {
         on_chips.push(text(discussion(&frames)));
     }
+    let varied = scale.symbols.as_ref().map(|symbols| table("varied", varied(symbols, scale.machine)));
+    let symbols = std::iter::once(table("symbols", symbol_table())).chain(varied).collect();
     let sections = vec![
-        section("Symbols", vec![table("symbols", symbol_table())]),
+        section("Symbols", symbols),
         section(
             "What a frame takes",
             vec![table("workloads", workloads(&frames)), table("units", units(&frames))],
@@ -242,6 +244,37 @@ fn symbol_table() -> Table {
             origin.into(),
             symbol.reference.into(),
         ]);
+    }
+    table
+}
+
+/// Table of the demand by the table's formulas, with a row for each combination of values and each frame.
+fn varied(symbols: &SymbolAxes, machine: Machine) -> Table {
+    let mut heads: Vec<_> = symbols.names().map(|name| Column::new(name, "")).collect();
+    heads.extend(columns(&[
+        ("frame", ""),
+        ("at 30 frames/s", "TFLOPS"),
+        ("at 30 frames/s", "TB/s"),
+        ("by bandwidth", "chips"),
+        ("by arithmetic", "chips"),
+        ("overall", "chips"),
+    ]));
+    let mut table = Table::new("Chips for 30 frames/s by the table's formulas, with other values", heads);
+    for (values, symbols) in symbols.combinations() {
+        for frame in table_frames(symbols, machine) {
+            let total = frame.cost.total();
+            let needed = frame.nominal_prediction().chips_needed(30.0);
+            let mut row: Vec<Cell> = values.iter().map(|&value| value.into()).collect();
+            row.extend([
+                frame.name.as_str().into(),
+                (30.0 * total.flops / 1e12).into(),
+                (30.0 * total.dram_bytes / 1e12).into(),
+                needed.bandwidth.into(),
+                needed.computation.into(),
+                needed.overall.into(),
+            ]);
+            table.push(row);
+        }
     }
     table
 }

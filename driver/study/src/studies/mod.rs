@@ -16,7 +16,8 @@ mod techniques;
 mod times;
 mod workload;
 
-pub use self::sweep::Sweep;
+pub(crate) use self::sweep::SweptScene;
+pub use self::sweep::{Hardware, Sweep};
 use super::error::StudyError;
 use super::host::{HostBench, HostFrame};
 use super::laboratory::Results;
@@ -110,6 +111,8 @@ mod tests {
 
     use photoncard_map::photon_map::PhotonMapSize;
     use photoncard_picture::choice::Choice;
+    use photoncard_render::ChipModel;
+    use photoncard_render::emulator::EmulatedKind;
     use photoncard_render::emulator::contents::Contents;
 
     use super::super::host::{Change, Changed};
@@ -159,6 +162,7 @@ mod tests {
             reads,
             waiting_written_bytes: 0,
             contents: Contents::ZERO,
+            reuse: None,
         };
         let error = TileDeviation { pixels: 256, squares: 7.0, noise: 0.5, sum: 760.0, reference: 768.0 };
         let outcome = |point: &Point| match point.task {
@@ -172,6 +176,22 @@ mod tests {
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
         study.report(scale, &results, &[(); 9].map(|()| host_frame())).to_html()
+    }
+
+    #[test]
+    fn the_points_of_all_studies_are_possible_on_their_chips() {
+        let kinds = [EmulatedKind::Large, EmulatedKind::Micro].map(ChipModel::from);
+        for scale in [Scale::FULL, Scale::QUICK] {
+            for study in Study::ALL {
+                study.points(&scale).iter().for_each(|point| point.check().unwrap());
+            }
+            for model in kinds.clone() {
+                let scale = scale.clone().with_chips(model);
+                for study in [Study::Reordering, Study::Table71, Study::Scaling, Study::Interactive] {
+                    study.points(&scale).iter().for_each(|point| point.check().unwrap());
+                }
+            }
+        }
     }
 
     #[test]

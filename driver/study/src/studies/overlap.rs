@@ -2,7 +2,6 @@
 //! as it is built, does not.
 
 use photoncard_cards::scheduler::GatherOrder;
-use photoncard_firmware::kind::REFERENCE;
 use photoncard_map::photon_map::PhotonLayout;
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::timing::FrameTimes;
@@ -27,7 +26,10 @@ const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 /// Sizes of the queue, in gathers, for which times are compared. Points are measured with each size and with
 /// half of each.
 fn queues(scale: &Scale) -> Vec<u32> {
-    scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192])
+    let mut queues = scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192]);
+    let most = scale.chip().budget().gather_queue;
+    queues.retain(|&queue| queue <= most);
+    queues
 }
 
 /// Point of a line with a queue of `queue` entries; `None` for the chip's own size.
@@ -41,7 +43,7 @@ fn point(scale: &Scale, (order, layout): Line, queue: Option<u32>) -> Point {
 
 /// Point of a line with a queue of `queue / 2` entries. An order without a queue gets the chip's own size.
 fn half(scale: &Scale, line: Line, queue: Option<u32>) -> Point {
-    let half = queue.unwrap_or(REFERENCE.gather_queue) / 2;
+    let half = queue.unwrap_or_else(|| scale.chip().budget().gather_queue) / 2;
     point(scale, line, line.0.has_queue().then_some(half))
 }
 

@@ -11,7 +11,7 @@ use super::super::measure::Measurement;
 use super::super::point::{ALONG_CURVE, Point};
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
-use super::super::scale::{Scale, WIDEST_TILE};
+use super::super::scale::{Scale, TILE};
 use super::overlap;
 use super::present::{
     CORNELL, GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section,
@@ -36,9 +36,8 @@ const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Sort,
 ];
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
-/// Sides of tiles, pixels: the dissertation's, a larger one, and the largest that the reference chip can
-/// render.
-const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
+/// Side of tiles between the dissertation's and the largest, pixels.
+const LARGER_TILE: u32 = 32;
 /// Published bytes per frame (Graphics Interface 2005): requested in the naive order, fetched from DRAM in
 /// the practical orders, and fetched from DRAM along a Hilbert curve.
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
@@ -46,6 +45,15 @@ const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
 /// Orders that a chip supports, each with both layouts.
 fn lines() -> Vec<(GatherOrder, PhotonLayout)> {
     LAYOUTS.into_iter().flat_map(|layout| ORDERS.map(|order| (order, layout))).collect()
+}
+
+/// Sides of tiles, pixels: the dissertation's, a larger one, and the largest that the chip can render.
+fn tiles(scale: &Scale) -> Vec<u32> {
+    let widest = scale.widest_tile();
+    let mut tiles = vec![TILE, LARGER_TILE, widest];
+    tiles.retain(|&side| side == TILE || side <= widest);
+    tiles.dedup();
+    tiles
 }
 
 fn sizes(scale: &Scale) -> Vec<u32> {
@@ -77,8 +85,14 @@ fn behind(photon: CacheSpec) -> CacheSettings {
 
 fn point(scale: &Scale, order: Order, layout: PhotonLayout, caches: CacheSettings) -> Point {
     let settings = scale.settings(order.unwrap_or(GatherOrder::Sort)).with(|s| s.photons.layout = layout);
-    let point = scale.traffic_behind(CORNELL, settings, caches);
-    Point { is_along_curve: order.is_none(), ..point }
+    match order {
+        Some(_) => scale.traffic_behind(CORNELL, settings, caches),
+        // No chip has room for the gathers of a frame: the bound is the reference chip's.
+        None => Point {
+            is_along_curve: true,
+            ..Scale { model: None, ..scale.clone() }.traffic_behind(CORNELL, settings, caches)
+        },
+    }
 }
 
 /// Point with sorted gathers in tiles of `tile` x `tile` pixels.
@@ -96,17 +110,19 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
         let caches = sizes(scale).into_iter().map(of_size);
         let caches = caches.chain(associativities().map(|(_, caches)| caches));
         points.extend(caches.map(|caches| point(scale, Some(order), PhotonLayout::Jensen, caches)));
-        points.push(point(scale, Some(order), PhotonLayout::Lines, CacheSettings::default()));
+        points.push(point(scale, Some(order), PhotonLayout::Lines, scale.caches()));
     }
-    points.extend(LAYOUTS.into_iter().flat_map(|layout| TILES.map(|tile| sorted(scale, layout, tile))));
+    for layout in LAYOUTS {
+        points.extend(tiles(scale).into_iter().map(|tile| sorted(scale, layout, tile)));
+    }
     points.extend(overlap::points(scale, &lines()));
-    points.extend(LAYOUTS.map(|layout| point(scale, None, layout, CacheSettings::default())));
+    points.extend(LAYOUTS.map(|layout| point(scale, None, layout, scale.caches())));
     points
 }
 
 pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     let nominal = |order, layout| {
-        let point = point(scale, order, layout, CacheSettings::default());
+        let point = point(scale, order, layout, scale.caches());
         results.traffic(&point)
     };
     let introduction = vec![
@@ -118,7 +134,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
             .to_owned(),
     ];
     let mut by_order = vec![
-        table("orders", orders(&nominal)),
+        table("orders", orders(scale, &nominal)),
         plot_of_orders(&nominal),
         table("gathers", by_gather(scale, &nominal)),
         text(share_of_gathers(scale, &nominal)),
@@ -156,12 +172,15 @@ fn by_order<'a>(
     table
 }
 
-fn orders<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
+fn orders<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
     let naive = nominal(Some(GatherOrder::Naive), PhotonLayout::Jensen).photon_map_bytes().value;
     let heads =
         [("gathers", "million"), ("raw", "GB"), ("from DRAM", "GB"), ("less than naive, jensen", "times")];
-    let title = "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways";
-    by_order(title, &heads, nominal, |_, _, measured| {
+    let title = match &scale.model {
+        None => "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways".to_owned(),
+        Some(_) => format!("Photon map traffic of a frame, caches {}", scale.caches()),
+    };
+    by_order(&title, &heads, nominal, |_, _, measured| {
         let dram = measured.photon_map_bytes();
         let factor = naive / dram.value;
         vec![cell(measured.gathers(), 1e6), gigabytes(measured.raw_bytes()), gigabytes(dram), factor.into()]
@@ -185,7 +204,7 @@ fn by_tile<'a>(
     ];
     let mut table = Table::new("Sorted gathers, the queue drained when it is full", columns(&heads));
     for layout in LAYOUTS {
-        for tile in TILES {
+        for tile in tiles(scale) {
             let measured = results.traffic(&sorted(scale, layout, tile));
             table.push(vec![
                 tile.into(),
@@ -203,7 +222,7 @@ fn by_time<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Meas
     let heads = times::heads(&scale.machine);
     let heads: Vec<_> = heads.iter().map(|(name, unit)| (name.as_str(), *unit)).collect();
     by_order("Time of one chip for the frame", &heads, nominal, |order, layout, measured| {
-        let point = point(scale, order, layout, CacheSettings::default());
+        let point = point(scale, order, layout, scale.caches());
         times::cells(&TimedFrame::new(&point, measured, &scale.machine))
     })
 }

@@ -2,7 +2,6 @@
 //! number of tiles in flight; and of time as a function of the number of chips.
 
 use photoncard_cards::scheduler::GatherOrder;
-use photoncard_firmware::kind::REFERENCE;
 use photoncard_map::photon_map::PhotonLayout;
 use photoncard_render::RenderSettings;
 
@@ -58,7 +57,7 @@ const SWEEPS: [Sweep; 3] = [
         heading: "Side of a tile",
         axis: "side of a tile (pixels)",
         lines: &[SORT, SORT_LINES, ALL_ON],
-        values: |_| powers(4, REFERENCE.tile_pixels.isqrt()),
+        values: |scale| powers(4, scale.widest_tile()),
         set: |settings, side| settings.schedule.tile = Some(side),
     },
     Sweep {
@@ -67,7 +66,7 @@ const SWEEPS: [Sweep; 3] = [
         axis: "gathers that may wait on a chip",
         lines: &[HASH, SORT, SORT_LINES],
         values: |scale| {
-            let all = powers(256, REFERENCE.gather_queue);
+            let all = powers(256, scale.chip().budget().gather_queue);
             if scale.is_quick { all.into_iter().step_by(2).collect() } else { all }
         },
         set: |settings, queue| settings.schedule.queue = Some(queue),
@@ -106,9 +105,11 @@ impl Sweep {
         });
         let x = (self.axis, "", XScale::Log2);
         let axes = panel("", x, ("photon map from DRAM", "GB a frame", YScale::Log10), lines.collect());
-        let caption = "Cornell box, cache of 128 KB. All techniques: sort, combined sampling, irradiance cache, photons in \
-                       leaves that fill a line.";
-        vec![plot(self.name, &title, caption, vec![axes]), table(self.name, rows)]
+        let caption = format!(
+            "Cornell box, caches {}. All techniques: sort, combined sampling, irradiance cache, photons in leaves that fill a line.",
+            scale.caches()
+        );
+        vec![plot(self.name, &title, &caption, vec![axes]), table(self.name, rows)]
     }
 }
 

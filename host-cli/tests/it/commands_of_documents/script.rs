@@ -62,6 +62,17 @@ fn defects_of_command(tree: &CommandTree, words: &[&str]) -> Vec<String> {
         arguments.iter().filter_map(|word| repository::defect_of_path(word)).collect();
     match program.rsplit('/').next().unwrap_or(program) {
         "photoncard" => defects.extend(tree.defect_of_arguments(arguments)),
+        // GNU parallel calls a command with each word after `:::`.
+        "parallel" => {
+            let mut parts = arguments.split(|&argument| argument == ":::");
+            let command = parts.next().unwrap_or_default();
+            let word = parts.next().and_then(<[_]>::first).unwrap_or(&"{}");
+            let words: Vec<_> = command.iter().map(|argument| argument.replace("{}", word)).collect();
+            let words: Vec<_> = words.iter().map(String::as_str).collect();
+            if !words.is_empty() {
+                defects.extend(defects_of_command(tree, &words));
+            }
+        }
         "cargo" => {
             defects.extend(repository::defects_of_cargo(arguments));
             let mut parts = arguments.split(|&argument| argument == "--");

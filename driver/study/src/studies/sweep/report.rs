@@ -1,46 +1,46 @@
-//! Report of a sweep: memory traffic by structure (kind of data) and time of one chip at every point, and
-//! plots over each axis.
+//! Report of a sweep: memory traffic by structure (kind of data), time and energy at every point, and plots
+//! over each axis.
 
+use photoncard_cards::scheduler::GatherOrder;
 use photoncard_picture::choice::Choice;
-use photoncard_render::cost_model::{Cost, Machine};
+use photoncard_render::cost_model::{Cost, Prediction};
+use photoncard_render::emulator::memory_model::CacheSettings;
 use photoncard_shared::address::Structure;
 
-use super::super::super::axes::{Axes, Axis};
-use super::super::super::laboratory::Results;
+use super::super::super::axes::Axis;
 use super::super::super::measure::Measurement;
-use super::super::super::point::Point;
-use super::super::super::report::{self, Block, Cell, Column, Report, Series, Table, XScale, YScale};
+use super::super::super::point::{Point, Task};
+use super::super::super::report::{self, Block, Cell, Report, Series, Table, XScale, YScale, slug};
 use super::super::super::sample::Estimate;
 use super::super::arithmetic;
 use super::super::present::{
-    cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
+    cell, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
 };
 use super::super::workload::{of_frame, symbols};
+use super::reuse;
+use super::swept::{Hardware, Swept};
 
 /// Maximum number of lines in a plot.
 const MAX_LINES: usize = 8;
 
-struct Swept<'a> {
-    axes: &'a Axes,
-    points: &'a [Point],
-    results: &'a Results,
-    machine: &'a Machine,
-}
+/// Frame rate for which chips are counted.
+const RATE: f64 = 30.0;
 
-pub(super) fn report(
-    scene: &str,
-    axes: &Axes,
-    points: &[Point],
-    results: &Results,
-    machine: &Machine,
-) -> Report {
-    let swept = Swept { axes, points, results, machine };
+pub(super) fn report(swept: &Swept) -> Report {
+    let Swept { axes, hardware, .. } = *swept;
+    let machine = &hardware[0].machine;
+    let chip = match hardware.iter().all(|other| other.machine == *machine) {
+        true => machine.to_string(),
+        false => "the rates of its row".to_owned(),
+    };
+    let scene = swept.scene.name;
     let introduction = vec![
         format!("Work and memory traffic of {scene} in frames that differ in the settings below."),
         how_it_counts(),
         format!(
-            "The time of a chip is that of {machine}, at its counted arithmetic. Memory and arithmetic work at once, so that a frame \
-             takes the longer of both."
+            "The time of a chip is that of {chip}, at its counted arithmetic. Memory and arithmetic work at once, so that a frame \
+             takes the longer of both. Energy is that of bytes read from and written to caches, of bytes of DRAM, and of counted \
+             operations: no leakage, no control, no buffers. It compares chips, and is a lower bound."
         ),
     ];
     let mut sections = vec![section("Points", vec![table("points", swept.totals())])];
@@ -51,25 +51,11 @@ pub(super) fn report(
         ));
     }
     sections.push(section("Structures", vec![table("structures", swept.structures())]));
+    sections.extend(reuse::section_of(swept));
     page(&format!("Sweep of {scene}"), introduction, sections)
 }
 
 impl Swept<'_> {
-    fn measured(&self, indices: &[usize]) -> &Measurement {
-        self.results.traffic(&self.points[self.axes.point(indices)])
-    }
-
-    /// Columns of the axes, followed by `others`.
-    fn heads(&self, others: &[(&str, &str)]) -> Vec<Column> {
-        let axes = self.axes.list().iter().map(|axis| Column::new(axis.name.as_str(), ""));
-        axes.chain(columns(others)).collect()
-    }
-
-    /// Cells with the values of a combination.
-    fn values(&self, indices: &[usize]) -> Vec<Cell> {
-        self.axes.values(indices).into_iter().map(|(_, value)| value.into()).collect()
-    }
-
     /// Table with a row for each point.
     fn totals(&self) -> Table {
         let heads = self.heads(&[
@@ -83,12 +69,20 @@ impl Swept<'_> {
             ("photon map", "bytes a gather"),
             ("chip's memory", "s"),
             ("chip's arithmetic", "s"),
+            ("chips for 30 frames/s", "chips"),
+            ("energy of caches", "J"),
+            ("energy of DRAM", "J"),
+            ("energy of arithmetic", "J"),
+            ("energy", "J"),
+            ("on-chip memory", "mm^2"),
         ]);
-        let mut table = Table::new("Work, bytes from DRAM and time of a chip, of a frame", heads);
-        for (indices, point) in self.axes.combinations().zip(self.points) {
+        let mut table = Table::new("Work, bytes from DRAM, time of a chip and energy, of a frame", heads);
+        let points = self.axes.combinations().zip(self.points).zip(self.hardware);
+        for ((indices, point), hardware) in points {
             let measured = self.results.traffic(point);
             let gathers = measured.gathers();
-            let [memory, arithmetic] = chip_seconds(point, measured, self.machine);
+            let Demand { memory, arithmetic, chips, energy } = Demand::of(point, measured, hardware);
+            let area = hardware.energy.sram_mm2(f64::from(point.chip().budget().sram_bytes));
             let mut row = self.values(&indices);
             row.extend([
                 measured.rendered.into(),
@@ -101,9 +95,13 @@ impl Swept<'_> {
                 (gathers.value > 0.0).then(|| measured.photon_map_bytes().value / gathers.value).into(),
                 memory.into(),
                 arithmetic.into(),
+                chips.into(),
             ]);
+            row.extend(energy.map(Cell::from));
+            row.extend([energy.iter().sum::<f64>().into(), area.into()]);
             table.push(row);
         }
+        self.identify(&mut table, 1);
         table
     }
 
@@ -143,6 +141,7 @@ impl Swept<'_> {
                 table.push(row);
             }
         }
+        self.identify(&mut table, structures.len());
         table
     }
 
@@ -168,7 +167,12 @@ impl Swept<'_> {
         let panels =
             vec![of("photon map", Measurement::photon_map_bytes), of("scene", Measurement::scene_bytes)];
         let name = &self.axes.list()[axis].name;
-        plot(&format!("by-{name}"), &format!("Bytes from DRAM by {name}"), &self.caption(&kept), panels)
+        plot(
+            &format!("by-{}", slug(name)),
+            &format!("Bytes from DRAM by {name}"),
+            &self.caption(&kept),
+            panels,
+        )
     }
 
     /// Plot of the bytes from DRAM over the values of one axis, with a line for each structure. The other
@@ -185,7 +189,7 @@ impl Swept<'_> {
         let axes = panel("", label, ("from DRAM", "GB a frame", YScale::Log10), lines.collect());
         let others: Vec<_> = (0..first.len()).filter(|&other| other != axis).collect();
         let title = format!("Bytes from DRAM of each structure by {name}");
-        plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
+        plot(&format!("structures-by-{}", slug(name)), &title, &self.caption(&others), vec![axes])
     }
 
     /// Line of `bytes` over the values of one axis. The other axes have the values of the combination
@@ -226,13 +230,6 @@ impl Swept<'_> {
         }
         (varied, kept)
     }
-
-    /// Caption with the values of the axes that keep their first value.
-    fn caption(&self, kept: &[usize]) -> String {
-        let axes = kept.iter().map(|&axis| &self.axes.list()[axis]);
-        let values: Vec<_> = axes.map(|axis| format!("{} {}", axis.name, axis.values[0])).collect();
-        if values.is_empty() { String::new() } else { format!("With {}.", values.join(", ")) }
-    }
 }
 
 /// Horizontal positions of the values: the values if all are positive numbers or sizes, otherwise their
@@ -262,10 +259,56 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     axis.values.iter().map(number).collect()
 }
 
-/// Times that the memory and the arithmetic of one chip take for a frame, seconds.
-fn chip_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> [f64; 2] {
-    let symbols = symbols(&point.settings);
-    let workload = of_frame(measured, symbols.pixels(), &symbols);
-    let total = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols)).total();
-    [total.dram_bytes / machine.bandwidth, total.flops / machine.flops]
+/// What a frame demands of the hardware.
+struct Demand {
+    /// Time that the memory of one chip takes, seconds.
+    memory: f64,
+    /// Time that the arithmetic of one chip takes, seconds.
+    arithmetic: f64,
+    /// Chips for [`RATE`] frames a second; `None` if the host's link does not carry them.
+    chips: Option<u64>,
+    /// Energies of caches, of DRAM and of arithmetic, J.
+    energy: [f64; 3],
+}
+
+impl Demand {
+    fn of(point: &Point, measured: &Measurement, Hardware { machine, energy, .. }: &Hardware) -> Self {
+        let symbols = symbols(&point.settings);
+        let workload = of_frame(measured, symbols.pixels(), &symbols);
+        let cost = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols));
+        let total = cost.total();
+        let caches = cache_traffic(point, measured);
+        let caches = caches.map(|(traffic, bytes)| energy.sram_joules(traffic, bytes)).iter().sum();
+        Self {
+            memory: total.dram_bytes / machine.bandwidth,
+            arithmetic: total.flops / machine.flops,
+            chips: Prediction::new(&workload, &cost, machine).chips_needed(RATE).overall,
+            energy: [
+                caches,
+                energy.dram_joules(measured.dram_bytes().value),
+                energy.flop_joules(total.flops),
+            ],
+        }
+    }
+}
+
+/// Bytes that are read from, or filled into, the caches of photon map and scene in a frame, and the sizes of
+/// these caches, bytes.
+fn cache_traffic(point: &Point, measured: &Measurement) -> [(f64, f64); 2] {
+    let waits = point.settings.schedule.order == GatherOrder::Buckets;
+    let sizes = match point.task {
+        Task::Traffic { caches: CacheSettings::Split { by_work: Some(caches), .. }, .. } if waits => {
+            // Gathers read the photon map, and rays the scene.
+            [caches.gathering.bytes, caches.casting.bytes]
+        }
+        Task::Traffic { caches: CacheSettings::Split { photon, scene, .. }, .. } => {
+            [photon.bytes, scene.bytes]
+        }
+        Task::Traffic { caches: CacheSettings::Unified(both), .. } => [both.bytes; 2],
+        Task::Quality { .. } => [0; 2],
+    };
+    let photon_map =
+        measured.total(|tile| (tile.photon_map().raw_bytes + tile.photon_map().dram_bytes) as f64);
+    let scene = measured.total(|tile| (tile.scene().raw_bytes + tile.scene().dram_bytes) as f64);
+    [(photon_map.value, f64::from(sizes[0])), (scene.value, f64::from(sizes[1]))]
 }

@@ -5,7 +5,7 @@ use photoncard_map::photon_map::PhotonLayout;
 use photoncard_render::{Radiance, RenderSettings, Sampling};
 
 use super::super::super::point::Point;
-use super::super::super::scale::{IRRADIANCE_ERROR, Scale, TILE, WIDEST_TILE};
+use super::super::super::scale::{IRRADIANCE_ERROR, REFERENCE_TILE, Scale, TILE};
 use super::super::flights::{LARGE_IN_FLIGHT, Setup};
 
 /// A combination of techniques.
@@ -44,7 +44,7 @@ pub(super) const EXACT: Technique = Technique {
     name: "sort, lines, largest tiles",
     order: GatherOrder::Sort,
     layout: PhotonLayout::Lines,
-    tile: WIDEST_TILE,
+    tile: REFERENCE_TILE,
     ..NAIVE
 };
 pub(super) const ALL: Technique = Technique {
@@ -54,7 +54,7 @@ pub(super) const ALL: Technique = Technique {
     irradiance_error: Some(IRRADIANCE_ERROR),
     radiance: Radiance::Density,
     layout: PhotonLayout::Jensen,
-    tile: WIDEST_TILE,
+    tile: REFERENCE_TILE,
     in_flight: None,
 };
 pub(super) const ALL_IN_LINES: Technique =
