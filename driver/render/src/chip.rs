@@ -87,8 +87,12 @@ impl ChipModel {
     /// range or in contradiction to others.
     pub fn read(path: &Path) -> Result<Self, ChipFileError> {
         let mut text = String::new();
-        let read = File::open(path).and_then(|file| file.take(MAX_BYTES).read_to_string(&mut text));
+        let read = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text));
         read.map_err(|source| ChipFileError::Unreadable { path: path.to_owned(), source })?;
+        if text.len() as u64 > MAX_BYTES {
+            let reason = format!("the file has more than {MAX_BYTES} bytes: it is no chip");
+            return Err(ChipFileError::Refused { path: path.to_owned(), line: 1, reason });
+        }
         Self::parse(path, &text).map_err(|(span, reason)| ChipFileError::Refused {
             path: path.to_owned(),
             line: 1 + text[..span.start.min(text.len())].matches('\n').count(),
@@ -108,6 +112,7 @@ impl ChipModel {
             energy: Energy::PUBLISHED,
         };
         let mut kind = Emulated::like::<Reference>();
+        let mut own_caches = None;
         for (name, table) in parsed.get_ref() {
             let Some(content) =
                 table.get_ref().as_table().filter(|_| TABLES.contains(&name.get_ref().as_ref()))
@@ -121,12 +126,13 @@ impl ChipModel {
                     let placed = |error| place(&error, content, table.span());
                     kind = kind.with_capacities(&file.capacities).map_err(placed)?;
                 }
-                "caches" => file.caches = Some(caches(content)?),
+                "caches" => own_caches = Some(content),
                 "units" => file.rates = rates(content)?,
                 _ => file.energy = energy(content)?,
             }
         }
         let kind = EmulatedKind::File(kind);
+        file.caches = own_caches.map(|content| caches(content, kind.caches())).transpose()?;
         Ok(Self { kind, file: Some(Arc::new(file)), replaced: Capacities::new() })
     }
 
@@ -234,22 +240,28 @@ fn place(error: &ChipError, content: &DeTable, table: Range<usize>) -> Refusal {
     (stated.map_or(table, Spanned::span), format!("[memory] {error}"))
 }
 
-/// Caches in the text form of the command line, part by part.
-fn caches(content: &DeTable) -> Result<CacheSettings, Refusal> {
-    let known = ["photon", "scene", "unified", "index"];
-    let mut parts = Vec::new();
-    for (name, value) in content {
-        if !known.contains(&name.get_ref().as_ref()) {
-            return Err(unknown("caches", name, &known));
-        }
+/// The caches `own`, with the stated ones in their place.
+fn caches(content: &DeTable, own: CacheSettings) -> Result<CacheSettings, Refusal> {
+    let mut caches = own;
+    // A cache for everything comes first: others beside it are refused. The index is of all.
+    let rank = |name: &str| match name {
+        "unified" => 0,
+        "index" => 2,
+        _ => 1,
+    };
+    let mut stated: Vec<_> = content.iter().collect();
+    stated.sort_by_key(|(name, _)| rank(name.get_ref()));
+    for (name, value) in stated {
+        let refused = |reason| (value.span(), format!("[caches] {}: {reason}", name.get_ref()));
         let Some(text) = value.get_ref().as_str() else {
-            let reason = format!("[caches] {} is no text; use \"SIZE/LINE/WAYS\"", name.get_ref());
-            return Err((value.span(), reason));
+            return Err(refused("it is no text; use \"SIZE/LINE/WAYS\"".to_owned()));
         };
-        parts.push(format!("{}={text}", name.get_ref()));
+        caches = match caches.with_part(name.get_ref(), text) {
+            Some(replaced) => replaced.map_err(refused)?,
+            None => return Err(unknown("caches", name, &CacheSettings::PARTS)),
+        };
     }
-    let place = content.keys().next().map_or(0..0, Spanned::span);
-    parts.join(",").parse().map_err(|reason| (place, format!("[caches] {reason}")))
+    Ok(caches)
 }
 
 fn rates(content: &DeTable) -> Result<Rates, Refusal> {
@@ -347,6 +359,28 @@ mod tests {
     }
 
     #[test]
+    fn caches_that_are_not_stated_are_those_of_the_stated_memory() {
+        let memory = "[memory]\nphoton_cache_bytes = 16384\nscene_cache_bytes = 8192\n";
+        let own = parse(memory).unwrap().caches().to_string();
+        assert!(own.starts_with("photon=16K/128/4,scene=8K/128/4,casting="), "{own}");
+        for (stated, expected) in [
+            ("", own.clone()),
+            ("index = \"hash\"", format!("{own},index=hash")),
+            ("scene = \"4K/128/2\"", own.replace("scene=8K/128/4", "scene=4K/128/2")),
+            ("unified = \"9K/384/3\"", "unified=9K/384/3".to_owned()),
+        ] {
+            let caches = parse(&format!("[caches]\n{stated}\n{memory}")).unwrap().caches();
+            assert_eq!(caches.to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_too_long_is_no_chip() {
+        let refused = parse(&format!("{}[memory]\n", "\n".repeat(1 << 16))).unwrap_err();
+        assert!(refused.contains("more than 65536 bytes"), "{refused}");
+    }
+
+    #[test]
     fn an_empty_file_is_the_reference_chip_by_published_figures() {
         let model = parse("# Nothing is stated.\n").unwrap();
         assert_eq!(model.kind().emulated(), EmulatedKind::Reference.emulated());
@@ -364,7 +398,9 @@ mod tests {
         )
         .unwrap();
         assert_eq!(model.kind().budget().gather_queue, 4096);
-        assert_eq!(model.caches().to_string(), "photon=64K/256/2,scene=32K/128/4,index=hash");
+        let caches = model.caches().to_string();
+        assert!(caches.starts_with("photon=64K/256/2,scene=32K/128/4,casting="), "{caches}");
+        assert!(caches.ends_with(",index=hash"), "{caches}");
         let rates =
             Rates { bandwidth_gb_s: Some(12.8), gflops: Some(40.0), latency_ns: Some(60.5), tasks: Some(16) };
         assert_eq!(model.rates(), rates);
@@ -392,9 +428,18 @@ mod tests {
             ("[memory]\ngather_queue = 9000000000000000000000", ["gather_queue is", "1 to 1048576"]),
             ("[memory]\ngather_queue = 1_000_000", ["1: [memory] sram_bytes is 1048576", "other buffers"]),
             ("[caches]\nl1 = \"8K/128/4\"", ["2: [caches] \"l1\" is none of", "photon, scene, unified"]),
-            ("[caches]\nphoton = 8192", ["2: [caches] photon is no text", "SIZE/LINE/WAYS"]),
+            ("[caches]\nphoton = 8192", ["2: [caches] photon: it is no text", "SIZE/LINE/WAYS"]),
             ("[caches]\nphoton = \"8K\"", ["2: [caches]", "SIZE/LINE/WAYS"]),
-            ("[caches]", ["1: [caches]", "SIZE/LINE/WAYS"]),
+            ("[caches]\nphoton = \"8K/128/4\"\nscene = \"1K/128/3\"", ["3: [caches] scene", "whole number"]),
+            ("[caches]\nphoton = \"8K/128/4,scene=1K/128/1\"", ["2: [caches] photon", "is no cache"]),
+            (
+                "[caches]\nunified = \"8K/128/4\"\nscene = \"1K/128/4\"",
+                ["3: [caches] scene", "unified replaces all other caches"],
+            ),
+            (
+                "[memory]\nwaiting_blocks = 0\n[caches]\ncasting = \"8K/128/4\"",
+                ["4: [caches] casting", "no block waits"],
+            ),
             ("[units]\nwatts = 1", ["2: [units] \"watts\" is none of", "bandwidth_gb_s, gflops"]),
             ("[units]\ngflops = 0", ["2: [units] gflops is 0", "a number from 0.1 to 1000000"]),
             ("[units]\nlatency_ns = nan", ["latency_ns is nan", "a number from 0 to 10000"]),

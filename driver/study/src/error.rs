@@ -66,7 +66,8 @@ impl StudyError {
             | Self::Scene(_)
             | Self::Axes(_)
             | Self::Store(StoreError::Folder { .. }) => true,
-            Self::Part(error) => !matches!(error, PartError::Store(_)),
+            Self::Part(PartError::Store(error)) => matches!(error, StoreError::Folder { .. }),
+            Self::Part(_) => true,
             Self::Render(error) => error.is_input(),
             Self::Store(_) | Self::Report(_) | Self::Threads(_) | Self::Stopped => false,
         }

@@ -133,7 +133,12 @@ impl<'a> HostBench<'a> {
             return Ok(known);
         }
         if self.is_united {
-            return Err(PartError::MissingPoint { point: name, part: "1".to_owned() }.into());
+            return Err(PartError::MissingPoint {
+                point: name,
+                part: "1".to_owned(),
+                reason: "is missing".to_owned(),
+            }
+            .into());
         }
         let frame = self.pool.install(|| self.frame(&scene, settings, changes));
         let frame = frame.map_err(|error| match error {

@@ -208,9 +208,13 @@ impl<'a> Laboratory<'a> {
     fn united_results(&mut self, points: &[Point], parts: u32) -> Result<Results, StudyError> {
         let mut results = Vec::new();
         for (point, number) in points.iter().zip(deal(points, parts)) {
-            let Some(outcome) = self.stored(point)? else {
+            let key = self.key(point)?;
+            let noticed = self.store.notices().len();
+            let Some(outcome) = self.store.get(&point.name(), &key) else {
                 let part = format!("{number}/{parts}");
-                return Err(PartError::MissingPoint { point: point.name(), part }.into());
+                let notices = &self.store.notices()[noticed..];
+                let reason = if notices.is_empty() { "is missing" } else { "is damaged" }.to_owned();
+                return Err(PartError::MissingPoint { point: point.name(), part, reason }.into());
             };
             results.push((point.clone(), outcome));
         }
@@ -240,7 +244,7 @@ impl<'a> Laboratory<'a> {
         let noticed = self.store.notices().len();
         let outcome = self.store.get(&point.name(), &key);
         for notice in &self.store.notices()[noticed..] {
-            self.observer.notice(notice);
+            self.observer.notice(&format!("{notice}; it is computed anew"));
         }
         Ok(outcome)
     }

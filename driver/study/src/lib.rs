@@ -35,7 +35,7 @@ pub use self::figures::check;
 use self::host::HostBench;
 pub use self::laboratory::{Laboratory, Results, StudyObserver};
 pub use self::measure::{Measurement, ReadSums, TileMeasurement};
-pub use self::parts::{Extent, PartError, RECORD, Union, unite};
+pub use self::parts::{Extent, PartError, RECORD, Union, UnitedPoints, unite};
 pub use self::point::{ALONG_CURVE, ImageKey, Point, Task};
 pub use self::quality::{Quality, TileDeviation};
 use self::report::Report;

@@ -2,8 +2,8 @@
 //!
 //! The points of a study are dealt to parts by the points alone. A part measures its share, and then writes
 //! the record [`RECORD`] beside them: the command, the versions, and the checksums of the scenes that it has
-//! measured. [`unite`] compares the records and copies the points of all parts into one folder, from which a
-//! run of the same command writes the report without measuring anything.
+//! measured. [`unite`] compares the records, and [`UnitedPoints`] copies the points of all parts into one
+//! folder, from which a run of the same command writes the report without measuring anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -24,6 +24,9 @@ use super::store::{POINTS, StoreError};
 
 /// Name of the file that a part writes when all of its points are finished.
 pub const RECORD: &str = "part.json";
+
+/// Maximum number of threads in a record.
+const MAX_THREADS: usize = 1024;
 
 /// Extent of a run of studies.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -126,7 +129,7 @@ pub enum PartError {
         command: String,
     },
     /// A point of a part is missing or damaged.
-    #[error("the point {point} of part {part} is missing")]
+    #[error("the point {point} of part {part} {reason}")]
     #[diagnostic(help(
         "measure the part again: a command with --part measures what is missing in its folder"
     ))]
@@ -135,6 +138,8 @@ pub enum PartError {
         point: String,
         /// Part that measures it.
         part: String,
+        /// Reason, such as that it is missing.
+        reason: String,
     },
     /// A file cannot be written.
     #[error("{0}")]
@@ -166,21 +171,52 @@ pub(crate) fn write_record(
     Ok(output::write(&folder.join(RECORD), format!("{json}\n").as_bytes())?)
 }
 
-/// Checks that the folders hold all parts of one study, and copies their points into `out`.
+/// Checks that the folders hold all parts of one study.
 ///
 /// # Errors
-/// If a folder has no record, the parts are of several versions, studies or scenes, a part is missing, or a
-/// file cannot be written.
-pub fn unite(folders: &[PathBuf], out: &Path) -> Result<Union, PartError> {
+/// If a folder has no record, the parts are of several versions, studies or scenes, or a part is missing.
+pub fn unite(folders: &[PathBuf]) -> Result<Union, PartError> {
     let records: Vec<Record> = folders.iter().map(|folder| read(folder)).collect::<Result<_, _>>()?;
-    let union = union(folders, &records)?;
-    let target = out.join(POINTS);
-    fs::create_dir_all(&target).map_err(|source| StoreError::Folder { folder: target.clone(), source })?;
-    for folder in folders {
-        copy(&folder.join(POINTS), &target)
-            .map_err(|reason| PartError::NoRecord { folder: folder.clone(), reason })??;
+    union(folders, &records)
+}
+
+/// Points of parts in one folder. Unless they are [kept](Self::keep), a folder of points that was made for
+/// them is removed when they are dropped.
+#[derive(Debug)]
+pub struct UnitedPoints {
+    new_folder: Option<PathBuf>,
+}
+
+impl UnitedPoints {
+    /// Copies the points of the folders of parts into `out`.
+    ///
+    /// # Errors
+    /// If a folder has no points, or a file cannot be written.
+    pub fn copy(folders: &[PathBuf], out: &Path) -> Result<Self, PartError> {
+        let target = out.join(POINTS);
+        let points = Self { new_folder: (!target.exists()).then(|| target.clone()) };
+        fs::create_dir_all(&target)
+            .map_err(|source| StoreError::Folder { folder: target.clone(), source })?;
+        for folder in folders {
+            copy(&folder.join(POINTS), &target)
+                .map_err(|reason| PartError::NoRecord { folder: folder.clone(), reason })??;
+        }
+        Ok(points)
     }
-    Ok(union)
+
+    /// Keeps the points, from which the reports were written.
+    pub fn keep(mut self) {
+        self.new_folder = None;
+    }
+}
+
+impl Drop for UnitedPoints {
+    fn drop(&mut self) {
+        if let Some(folder) = &self.new_folder {
+            // The reason for which the points are dropped is reported.
+            let _ = fs::remove_dir_all(folder);
+        }
+    }
 }
 
 fn read(folder: &Path) -> Result<Record, PartError> {
@@ -190,7 +226,15 @@ fn read(folder: &Path) -> Result<Record, PartError> {
         return Err(refused(format!("it has no file {RECORD}")));
     }
     let bytes = fs::read(&path).map_err(|error| refused(format!("{RECORD} cannot be read ({error})")))?;
-    serde_json::from_slice(&bytes).map_err(|error| refused(format!("{RECORD} is damaged ({error})")))
+    let damaged = |reason: String| refused(format!("{RECORD} is damaged ({reason})"));
+    let record: Record = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+    if Part::new(record.part, record.parts).is_none() {
+        return Err(damaged(format!("there is no part {}/{}", record.part, record.parts)));
+    }
+    if !(1..=MAX_THREADS).contains(&record.threads) {
+        return Err(damaged(format!("it states {} threads", record.threads)));
+    }
+    Ok(record)
 }
 
 /// Union of the parts with these records.

@@ -102,8 +102,7 @@ impl PointStore {
         match read {
             Ok(result) => Some(result),
             Err(why) => {
-                self.notices
-                    .push(format!("the finished point {} {why}; it is computed anew", path.display()));
+                self.notices.push(format!("the finished point {} {why}", path.display()));
                 None
             }
         }

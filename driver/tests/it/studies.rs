@@ -15,7 +15,8 @@ use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{
     Axis, AxisError, Extent, Hardware, Laboratory, Point, Provenance, Quality, RECORD, SampleRate, Scale,
-    Study, StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep, unite,
+    Study, StudyError, StudyObserver, StudyOptions, Sweep, SweepOptions, Task, UnitedPoints, run, run_sweep,
+    unite,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -190,7 +191,8 @@ fn parts_of_studies_add_up_to_the_whole() {
             files(path).into_keys().map(|file| file.file_name().unwrap().to_owned()).collect();
         assert_eq!(names, [RECORD], "a part writes no report");
     }
-    let united = unite(&parts, &folder.path().join("merged")).unwrap();
+    let united = unite(&parts).unwrap();
+    UnitedPoints::copy(&parts, &folder.path().join("merged")).unwrap().keep();
     let none = Counting::up_to(usize::MAX);
     run(&of("merged", Extent::Merged(united.clone())), &none).unwrap();
     assert_eq!(none.measured(), 0);

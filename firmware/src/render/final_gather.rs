@@ -19,7 +19,7 @@ use crate::photon::{
 };
 use crate::scene::light::environment_radiance;
 use crate::scene::{
-    BUNDLE_RAYS, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface,
+    BUNDLE_RAYS, Detail, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface_with,
 };
 
 /// Contribution of one final gather ray.
@@ -97,7 +97,7 @@ fn arrive<M: MemoryPort>(
     let random = |choice| point.pattern.choice(index, choice);
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut met = Surface::NOWHERE;
-    read_surface(context.scene, context.memory, ray, hit, &of_surface, &mut met)?;
+    read_surface_with(context.scene, context.memory, ray, hit, Detail::Gathering, &of_surface, &mut met)?;
     if path.may_pass(&met) {
         match path.follow(context, &mut met, hit, &random)? {
             PathEnd::Surface => {}

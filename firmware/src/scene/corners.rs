@@ -9,7 +9,7 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
-use super::texture::{read_texture, sample_texture};
+use super::texture::{TexelChoice, read_texture, sample_texels};
 use super::triangles::read_instance;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
@@ -105,6 +105,17 @@ impl Corners {
         memory: &mut impl MemoryPort,
         index: u16,
     ) -> Result<[f32; 4], Fault> {
+        self.texture_by(scene, memory, index, None)
+    }
+
+    /// Does [`Self::texture`]. With a choice, one texel stands for those of the interpolation.
+    pub(super) fn texture_by(
+        &self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        index: u16,
+        choice: Option<TexelChoice>,
+    ) -> Result<[f32; 4], Fault> {
         if index == NO_TEXTURE {
             return Ok([1.0; 4]);
         }
@@ -119,7 +130,7 @@ impl Corners {
         for (corner, weight) in corners.into_iter().zip(self.weights) {
             place.iter_mut().zip(corner).for_each(|(sum, coordinate)| *sum += coordinate * weight);
         }
-        sample_texture(scene, memory, &texture, place)
+        sample_texels(scene, memory, &texture, place, choice)
     }
 }
 

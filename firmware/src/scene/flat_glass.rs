@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_shared::layout::{Triangle, TriangleId};
 use photoncard_shared::message::Fault;
 
-use super::surface::{Surface, surface_of};
+use super::surface::{Detail, Surface, surface_of};
 use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 
@@ -18,11 +18,12 @@ pub(super) fn of_flat_glass(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    place: (TriangleId, &Triangle),
+    (id, triangle): (TriangleId, &Triangle),
     weights: [f32; 3],
 ) -> Result<Vec3, Fault> {
     let mut surface = Surface::NOWHERE;
     // The random value 0 chooses the base, the only layer that transmits.
+    let place = (id, triangle, Detail::Shading);
     surface_of(scene, memory, ray, place, weights, &|_| 0.0, &mut surface)?;
     Ok(surface.specular.transmitted * surface.specular.straight)
 }

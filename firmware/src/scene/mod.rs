@@ -27,7 +27,7 @@ pub use reflection::{
 };
 pub use seen::Seen;
 pub use specular::Specular;
-pub use surface::{SURFACE_CHOICES, Surface, read_surface};
+pub use surface::{Detail, SURFACE_CHOICES, Surface, read_surface, read_surface_with};
 pub use texture::{decode_texel, read_texture, sample_texture};
 pub use triangle::{Hit, Intersection, RayFrame};
 

@@ -3,7 +3,7 @@
 use photoncard_shared::layout::{NO_INSTANCE, TriangleId};
 use photoncard_shared::message::Fault;
 
-use super::surface::surface_of;
+use super::surface::{Detail, surface_of};
 use super::triangles::read_triangle;
 use super::{Hit, Ray, SceneImage, Surface};
 use crate::memory::MemoryPort;
@@ -52,6 +52,7 @@ impl Seen {
         let id = TriangleId::lone(self.triangle);
         let triangle = read_triangle(scene, memory, id)?;
         let [v, w] = self.weights;
-        surface_of(scene, memory, ray, (id, &triangle), [1.0 - v - w, v, w], &|_| 0.0, surface)
+        let place = (id, &triangle, Detail::Shading);
+        surface_of(scene, memory, ray, place, [1.0 - v - w, v, w], &|_| 0.0, surface)
     }
 }

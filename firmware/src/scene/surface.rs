@@ -3,8 +3,8 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{
-    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NO_TEXTURE, PANE, Reflectance, Triangle,
-    TriangleId,
+    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NARROW_LOBE, NO_TEXTURE, PANE, Reflectance,
+    Triangle, TriangleId,
 };
 use photoncard_shared::message::Fault;
 
@@ -21,6 +21,17 @@ use crate::vector::{max, max_component, min, unit};
 
 /// Number of random numbers that [`read_surface`] may use.
 pub const SURFACE_CHOICES: u32 = 4;
+
+/// Detail in which a surface is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Its shading: normals of the corners or of the normal map, and interpolated textures.
+    Shading,
+    /// A gather of photons at the end of a gather ray: one random texel stands for the interpolated ones of
+    /// each texture of a material without layers, and the geometric normal, with which photons are gathered,
+    /// for the shading normal where no ray follows a narrow lobe. Less of the scene is read.
+    Gathering,
+}
 
 /// Surface at a point that a ray hits, seen from the ray's side: the side on which the ray's origin lies.
 #[derive(Clone, Copy, Debug)]
@@ -145,8 +156,8 @@ impl Surface {
 
 /// Reads the surface where a ray hits a triangle into `surface`. The result is written in place, because a
 /// chip would copy its 230 bytes one by one. `random(i)` must return random number `i` in [0, 1), for `i`
-/// from 0 to [`SURFACE_CHOICES`] - 1. The numbers choose one of the material's layers; `random(0) == 0`
-/// chooses the base.
+/// from 0 to [`SURFACE_CHOICES`] - 1. The numbers choose one of the material's layers, or texels;
+/// `random(0) == 0` chooses the base.
 ///
 /// # Errors
 /// If the triangle's material is not in the card image.
@@ -159,8 +170,26 @@ pub fn read_surface(
     random: &dyn Fn(u32) -> f32,
     surface: &mut Surface,
 ) -> Result<(), Fault> {
+    read_surface_with(scene, memory, ray, hit, Detail::Shading, random, surface)
+}
+
+/// Does [`read_surface`] in this detail.
+///
+/// # Errors
+/// If the triangle's material is not in the card image.
+#[inline(always)]
+pub fn read_surface_with(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    hit: &Hit,
+    detail: Detail,
+    random: &dyn Fn(u32) -> f32,
+    surface: &mut Surface,
+) -> Result<(), Fault> {
     let Hit { intersection, triangle, id } = hit;
-    surface_of(scene, memory, ray, (*id, triangle), intersection.barycentric, random, surface)?;
+    let place = (*id, triangle, detail);
+    surface_of(scene, memory, ray, place, intersection.barycentric, random, surface)?;
     surface.distance = intersection.distance;
     Ok(())
 }
@@ -171,7 +200,7 @@ pub(super) fn surface_of(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    (id, triangle): (TriangleId, &Triangle),
+    (id, triangle, detail): (TriangleId, &Triangle, Detail),
     weights: [f32; 3],
     random: &dyn Fn(u32) -> f32,
     surface: &mut Surface,
@@ -198,7 +227,7 @@ pub(super) fn surface_of(
         }
     } else if is_visible || matches!(material.reflectance, Reflectance::Glass { .. }) {
         surface.emission = if is_visible { material.emission.into() } else { Vec3::ZERO };
-        finish(scene, memory, surface, (id, weights, is_front), &material, random)?;
+        finish(scene, memory, surface, (id, weights, is_front), (&material, detail), random)?;
     }
     Ok(())
 }
@@ -209,6 +238,13 @@ fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
+/// Returns true if a material without transmission covers its triangles, and has no layers but a normal map.
+fn is_of_base(scene: &SceneImage, memory: &mut impl MemoryPort, material: &Material) -> Result<bool, Fault> {
+    let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
+    let covers = !is_glass && material.flags & BLENDS == 0;
+    Ok(covers && read_layers(scene, memory, material)?.are_of_base())
+}
+
 /// Applies vertex attributes, textures and material to a surface. `surface.emission` must already be the
 /// untextured emission.
 #[inline(never)]
@@ -217,7 +253,7 @@ fn finish(
     memory: &mut impl MemoryPort,
     surface: &mut Surface,
     (id, weights, is_front): (TriangleId, [f32; 3], bool),
-    material: &Material,
+    (material, detail): (&Material, Detail),
     random: &dyn Fn(u32) -> f32,
 ) -> Result<(), Fault> {
     let Surface { outgoing, geometric_normal, .. } = *surface;
@@ -226,12 +262,16 @@ fn finish(
     let mut texel = Texel::WHITE;
     if let Some(corners) = &corners {
         let [base, metallic_roughness, emissive] = material.textures;
-        let [texture, colour] = [corners.texture(scene, memory, base)?, corners.colour()];
+        // Such a material has one layer: its choice needs no random number.
+        let is_gathered = detail == Detail::Gathering && is_of_base(scene, memory, material)?;
+        let choice = is_gathered.then(|| [random(1), random(2)]);
+        let [texture, colour] = [corners.texture_by(scene, memory, base, choice)?, corners.colour()];
         texel.colour = rgb(texture) * rgb(colour);
         if material.flags & BLENDS != 0 {
             surface.coverage = covered(material, texture[3] * colour[3]);
         }
-        [_, texel.roughness, texel.metallic, _] = corners.texture(scene, memory, metallic_roughness)?;
+        [_, texel.roughness, texel.metallic, _] =
+            corners.texture_by(scene, memory, metallic_roughness, choice)?;
         if max_component(surface.emission) > 0.0 {
             surface.emission *= rgb(corners.texture(scene, memory, emissive)?);
             surface.emitter = corners.emitter();
@@ -239,7 +279,8 @@ fn finish(
         let front = if is_front { geometric_normal } else { -geometric_normal };
         // The smooth normals of a box's corners would tilt the faces of a pane.
         if material.flags & PANE == 0
-            && let Some(normal) = base_normal(scene, memory, material, corners, front)?
+            && !(is_gathered && material.flags & NARROW_LOBE == 0)
+            && let Some(normal) = base_normal(scene, memory, material, (corners, choice), front)?
         {
             surface.normal = if is_front { normal } else { -normal };
         }
@@ -311,7 +352,7 @@ fn take_layer(
         Some(corners) => {
             let map = (layers.texture(LayerTexture::CoatNormal), layers.coat_normal_scale);
             let sign = if view.is_front { 1.0 } else { -1.0 };
-            let normal = mapped_normal(scene, memory, map, corners, surface.geometric_normal * sign)?;
+            let normal = mapped_normal(scene, memory, map, (corners, None), surface.geometric_normal * sign)?;
             normal.map(|normal| normal * sign)
         }
         None => None,

@@ -23,6 +23,9 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Texture::read(bytes))
 }
 
+/// Choice of one of the four texels of a bilinear interpolation: two random numbers in [0, 1).
+pub(super) type TexelChoice = [f32; 2];
+
 /// Value of a texture at texture coordinates, bilinearly interpolated or of the nearest texel: linear RGBA.
 ///
 /// # Errors
@@ -32,6 +35,18 @@ pub fn sample_texture(
     memory: &mut impl MemoryPort,
     texture: &Texture,
     coordinates: [f32; 2],
+) -> Result<[f32; 4], Fault> {
+    sample_texels(scene, memory, texture, coordinates, None)
+}
+
+/// Does [`sample_texture`]. With a choice, one texel stands for the four of the interpolation, whose weights
+/// are the probabilities (Fajardo, Wronski, Salvi, Pharr 2023, *Stochastic texture filtering*).
+pub(super) fn sample_texels(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    texture: &Texture,
+    coordinates: [f32; 2],
+    choice: Option<TexelChoice>,
 ) -> Result<[f32; 4], Fault> {
     let [u, v] = coordinates;
     let [columns, rows] = texture.size;
@@ -44,6 +59,9 @@ pub fn sample_texture(
     let [across, down] = [place(0, columns, across), place(1, rows, down)];
     if texture.nearest {
         return texel(scene, memory, texture, [across.nearest(), down.nearest()]);
+    }
+    if let Some([column, row]) = choice {
+        return texel(scene, memory, texture, [across.chosen(column), down.chosen(row)]);
     }
     let mut sum = [0.0; 4];
     for (row, row_weight) in down.texels() {
@@ -101,6 +119,12 @@ impl TexelPair {
     fn nearest(&self) -> u32 {
         let [first, second] = self.texels;
         if self.fraction < 0.5 { first } else { second }
+    }
+
+    /// Index of a texel that the random number `random`, in [0, 1), chooses with the texel's weight.
+    fn chosen(&self, random: f32) -> u32 {
+        let [first, second] = self.texels;
+        if random < self.fraction { second } else { first }
     }
 }
 

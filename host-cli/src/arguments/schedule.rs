@@ -18,7 +18,8 @@ pub(crate) struct ScheduleOptions {
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>(), hide_short_help = true)]
     pub(super) order: GatherOrder,
-    /// Number of direction bins of the gather rays, for orders with bins [default: 99]
+    /// Number of direction bins of the gather rays, for orders with bins [default: 99; 8 with --order
+    /// buckets]
     #[arg(long, hide_short_help = true)]
     bins: Option<u32>,
     /// Maximum number of gathers that wait on a chip, for orders with a queue [default: the chip's capacity]

@@ -35,14 +35,20 @@ pub(super) fn parse(stated: &[String], out: &Path) -> Result<(Vec<OsString>, Stu
     let mut output = OsString::from("--out=");
     output.push(out);
     words.insert(end_of_options(&words), output);
-    let refused = || {
-        let text = format!("the parts are of `{}`, which is no study of this program", line(stated));
+    let refused = |reason: &str| {
+        let text =
+            format!("the parts are of `{}`, which is no study of this program: {reason}", line(stated));
         let help = "measure the parts by photoncard study NAME --part K/N --out DIR";
         Failure::input(MietteDiagnostic::new(text).with_help(help))
     };
     match Arguments::try_parse_from(&words).map(|arguments| arguments.command) {
         Ok(Command::Study(arguments)) => Ok((words, arguments)),
-        _ => Err(refused()),
+        Ok(_) => Err(refused("another command")),
+        Err(error) => {
+            let text = error.to_string();
+            let reason = text.lines().next().unwrap_or_default();
+            Err(refused(reason.strip_prefix("error: ").unwrap_or(reason)))
+        }
     }
 }
 

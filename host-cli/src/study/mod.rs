@@ -12,7 +12,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use miette::MietteDiagnostic;
 use photoncard_driver::study::{
-    Extent, Provenance, StudyError, StudyObserver, StudyOptions, SweepOptions, run as study, run_sweep, unite,
+    Extent, Provenance, StudyError, StudyObserver, StudyOptions, SweepOptions, UnitedPoints, run as study,
+    run_sweep, unite,
 };
 
 use crate::arguments::{StudyArguments, StudyCommand, StudyMergeArguments};
@@ -41,7 +42,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
 
 /// Unites parts, and writes the report of their study.
 fn run_merge(merge: &StudyMergeArguments) -> Result<(), Failure> {
-    let union = unite(&merge.parts, &merge.out).map_err(|error| failure(error.into()))?;
+    let union = unite(&merge.parts).map_err(|error| failure(error.into()))?;
     let (words, mut arguments) = command::parse(&union.command, &merge.out)?;
     let output = match &mut arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => Some(&mut sweep.output),
@@ -52,7 +53,10 @@ fn run_merge(merge: &StudyMergeArguments) -> Result<(), Failure> {
     }
     let here = Provenance::here(&command::line(&union.command));
     let provenance = Provenance { date: union.date.clone(), host: union.host.clone(), ..here };
-    run_stated(&arguments, &words, provenance, Extent::Merged(union))
+    let points = UnitedPoints::copy(&merge.parts, &merge.out).map_err(|error| failure(error.into()))?;
+    run_stated(&arguments, &words, provenance, Extent::Merged(union))?;
+    points.keep();
+    Ok(())
 }
 
 /// Runs the studies of arguments, which are parsed from `words`.

@@ -113,11 +113,7 @@ fn replaced(words: &[OsString], values: &[Value]) -> Result<Option<SweepArgument
 
 /// Notice about caches that are larger than the on-chip memory of `chip`.
 fn beyond_chip(chip: &ChipModel, caches: &CacheSettings) -> Option<String> {
-    let sizes = match caches {
-        CacheSettings::Split { photon, scene, .. } => [photon.bytes, scene.bytes],
-        CacheSettings::Unified(both) => [both.bytes, 0],
-    };
-    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.kind().budget().sram_bytes));
+    let (taken, all) = (caches.bytes(), u64::from(chip.kind().budget().sram_bytes));
     (taken > all).then(|| {
         format!(
             "cache={caches} takes {taken} bytes, and the chip {chip} has {all} in all: its traffic is that of a \

@@ -191,7 +191,11 @@ fn statistics_name_the_options_that_the_work_depends_on() {
             "faults",
             json!("flips=0.000000001,drops=0,repeats=0,delays=0,seed=3"),
         ),
-        (&["--counters"], "cache", json!("photon=128K/128/4,scene=75K/128/4")),
+        (
+            &["--counters"],
+            "cache",
+            json!("photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=809K/128/4"),
+        ),
         (&["--cache", "unified=8K/128/2"], "cache", json!("unified=8K/128/2")),
         (&["--quality", "draft"], "quality", json!("draft")),
         (&["--threads", "2"], "threads", json!(2)),

@@ -87,6 +87,12 @@ impl Record for Layers {
 const TEXTURES: usize = 64;
 
 impl Layers {
+    /// Returns true if there is neither a coat nor sheen nor diffuse transmission: the parameters are those
+    /// of the base, or its normal map.
+    pub fn are_of_base(&self) -> bool {
+        self.coat <= 0.0 && self.sheen == [0.0; 3] && self.diffuse_transmission <= 0.0
+    }
+
     /// Layers of a material that has only its base.
     pub const NONE: Self = Self {
         specular: [0.0; 3],

@@ -205,7 +205,8 @@ fn counting_changes_no_picture() {
                 let direct = render_or_panic(&scene, &direct);
                 assert!(radiances(&direct.film) == expected, "{order:?}");
                 let counted = counted_picture.statistics;
-                // Gathers that wait in card memory are those of the tiles that a card has: these depend on time.
+                // Gathers that wait in card memory are those of the tiles that a card has, which depend on
+                // time.
                 let drains = |s: &Statistics| if order == GatherOrder::Buckets { 0 } else { s.drains };
                 let work = |s: &Statistics| (s.rays, s.gathers, s.photons_tested, s.photons_taken, drains(s));
                 assert_eq!(work(&counted), work(&direct.statistics));

@@ -122,8 +122,8 @@ impl FromStr for CacheSettings {
     type Err = String;
 
     /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash` or `unified=256K/128/8,index=hash`. Parts that
-    /// are left out have default values. The parts `casting` and `gathering` ([`CachesByWork`]) come together,
-    /// and there are none by default.
+    /// are left out have default values. The parts `casting` and `gathering` ([`CachesByWork`]) come
+    /// together, and there are none by default.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;
@@ -218,6 +218,57 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
 pub type ModelledMemory<M> = Inspected<Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>>;
 
 impl CacheSettings {
+    /// Names of the parts of a text.
+    pub(crate) const PARTS: [&'static str; 6] =
+        ["photon", "scene", "unified", "casting", "gathering", "index"];
+
+    /// Replaces the part `name` by the one in `text`; `None` if there is no such part.
+    pub(crate) fn with_part(mut self, name: &str, text: &str) -> Option<Result<Self, String>> {
+        if !Self::PARTS.contains(&name) {
+            return None;
+        }
+        let replaced = match (name, &mut self) {
+            ("index", _) => set_index(text).map(|index| self.specs().for_each(|spec| spec.index = index)),
+            ("unified", _) => cache(text).map(|spec| self = Self::Unified(spec)),
+            ("photon", Self::Split { photon, .. }) => cache(text).map(|spec| *photon = spec),
+            ("scene", Self::Split { scene, .. }) => cache(text).map(|spec| *scene = spec),
+            ("casting", Self::Split { by_work: Some(caches), .. }) => {
+                cache(text).map(|spec| caches.casting = spec)
+            }
+            ("gathering", Self::Split { by_work: Some(caches), .. }) => {
+                cache(text).map(|spec| caches.gathering = spec)
+            }
+            (_, Self::Split { .. }) => Err("no block waits on this chip: leave it out".to_owned()),
+            _ => Err("unified replaces all other caches: leave it or unified out".to_owned()),
+        };
+        Some(replaced.map(|()| self))
+    }
+
+    /// Each of the caches.
+    fn specs(&mut self) -> impl Iterator<Item = &mut CacheSpec> {
+        let (first, scene, by_work) = match self {
+            Self::Split { photon, scene, by_work } => (photon, Some(scene), by_work.as_mut()),
+            Self::Unified(both) => (both, None, None),
+        };
+        let by_work = by_work.into_iter().flat_map(|caches| [&mut caches.casting, &mut caches.gathering]);
+        [first].into_iter().chain(scene).chain(by_work)
+    }
+
+    /// Greatest sum, bytes, of the caches that are in use together.
+    pub fn bytes(&self) -> u64 {
+        let sizes = match *self {
+            Self::Unified(both) => [u64::from(both.bytes); 3],
+            Self::Split { photon, scene, by_work } => {
+                let split = u64::from(photon.bytes) + u64::from(scene.bytes);
+                let of_work = |cache: fn(&CachesByWork) -> CacheSpec| {
+                    by_work.as_ref().map_or(0, |caches| u64::from(cache(caches).bytes))
+                };
+                [split, of_work(|caches| caches.casting), of_work(|caches| caches.gathering)]
+            }
+        };
+        sizes.into_iter().max().unwrap_or(0)
+    }
+
     /// Wraps a memory in these caches.
     pub fn over<M: MemoryPort>(&self, memory: M) -> ModelledMemory<M> {
         let dram = Counted::new(memory);

@@ -2,10 +2,11 @@
 //! cache simulator, or below them, for a DRAM simulator.
 //!
 //! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
-//! blank, and a byte address in hexadecimal. Label 0 is a read of data, label 1 a write of a line. Label 4 is
-//! Dinero's escape that flushes its caches; it is written with address 0 at the beginning of every tile, and
-//! where a chip whose gathers wait in card memory begins to cast rays or to do gathers. A labelled trace adds the structure, the stage and the number of bytes of the read to the line; Dinero
-//! ignores them. Below the caches, each line of text is a fetch or a write of one line of card memory, in the
+//! blank, and a byte address in hexadecimal. Label 0 is a read of data, label 1 a write of a line. Label 4
+//! is Dinero's escape that flushes its caches; it is written with address 0 at the beginning of every tile,
+//! and where a chip whose gathers wait in card memory begins to cast rays or to do gathers. A labelled
+//! trace adds the structure, the stage and the number of bytes of the read to the line; Dinero ignores
+//! them. Below the caches, each line of text is a fetch or a write of one line of card memory, in the
 //! format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
 
 use std::fmt::Arguments;

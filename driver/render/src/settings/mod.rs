@@ -16,7 +16,7 @@ pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 pub use self::setting::{Changes, Setting};
 use crate::emulator::memory_model::CacheSettings;
-use photoncard_cards::scheduler::tiles;
+use photoncard_cards::scheduler::{GatherOrder, tiles};
 use photoncard_map::photon_map::{PhotonSettings, PhotonsFor};
 use photoncard_picture::film::{Film, FilmError, Window};
 use photoncard_picture::sums::SumFormat;
@@ -41,6 +41,9 @@ pub struct RenderSettings {
 
 /// Default number of direction bins for gather rays: three per entry of the direction table.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
+/// Default number of direction bins if gathers wait in card memory. Their buckets bring gathers together, so
+/// that bins serve the scene's cache alone: with few bins the surface of a gather point is read less often.
+const BINS_OF_BUCKETS: u32 = 8;
 
 /// Default minimum number of tiles per card, if there are several cards. At the end, a card waits on average
 /// half the time of a tile for the last tile of another card.
@@ -153,6 +156,16 @@ impl RenderSettings {
         }
     }
 
+    /// Number of direction bins of the gather rays.
+    fn bins(&self) -> u32 {
+        let by_order = match self.schedule.order {
+            GatherOrder::Buckets => BINS_OF_BUCKETS,
+            order if order.has_bins() => DEFAULT_BINS,
+            _ => return 1,
+        };
+        self.schedule.bins.unwrap_or(by_order)
+    }
+
     /// Returns whether cards keep irradiance records for later pictures that add samples.
     fn keeps_records(&self) -> bool {
         self.schedule.keep_records
@@ -181,7 +194,7 @@ impl RenderSettings {
             max_distance,
             sampling: self.integrator.sampling,
             irradiance_error: self.integrator.irradiance_error,
-            bins: if self.schedule.order.has_bins() { self.schedule.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
+            bins: self.bins(),
             drain: self.schedule.order.drain(),
             queue: self.schedule.queue.unwrap_or(u32::MAX),
             radiance: self.photons.radiance,

@@ -14,25 +14,32 @@ use super::super::report::{Block, Table};
 use super::super::scale::Scale;
 use super::present::{GIGA, SCENES, columns, table, text};
 
-/// A kind of chip, its number of tiles in flight, and its caches.
+/// A kind of chip, its order and number of tiles in flight, and its caches.
 #[derive(Clone, Copy)]
 pub(super) struct Setup {
     chip: EmulatedKind,
+    order: GatherOrder,
     in_flight: u32,
-    caches: CacheSettings,
+    /// `None` for the caches of the kind.
+    caches: Option<CacheSettings>,
 }
 
 /// The reference chip with one tile in flight: it empties its gather queue at the end of each tile.
 const ON_REFERENCE: Setup = Setup {
     chip: EmulatedKind::Reference,
+    order: GatherOrder::Sort,
     in_flight: 1,
-    caches: with_scene_cache(REFERENCE.scene_cache_bytes),
+    caches: Some(with_scene_cache(REFERENCE.scene_cache_bytes)),
 };
+/// The reference chip, whose gathers wait in card memory. Its caches take the memory that each kind of work
+/// leaves free.
+pub(super) const IN_CARD_MEMORY: Setup = Setup { order: GatherOrder::Buckets, caches: None, ..ON_REFERENCE };
 /// The large chip with the maximum number of tiles in flight.
 pub(super) const LARGE_IN_FLIGHT: Setup = Setup {
     chip: EmulatedKind::Large,
+    order: GatherOrder::Sort,
     in_flight: LARGE.in_flight,
-    caches: with_scene_cache(LARGE.scene_cache_bytes),
+    caches: Some(with_scene_cache(LARGE.scene_cache_bytes)),
 };
 /// The large chip with one tile in flight.
 const ON_LARGE: Setup = Setup { in_flight: 1, ..LARGE_IN_FLIGHT };
@@ -46,23 +53,28 @@ const fn with_scene_cache(bytes: u32) -> CacheSettings {
     }
 }
 
-/// Setups of the published chips, or those of the scale's chip: one tile in flight, and as many as it can
-/// have.
+/// Setups of the published chips, or those of the scale's chip: one tile in flight, as many as it can have,
+/// and gathers in card memory if it has room for their tables.
 fn setups(scale: &Scale) -> Vec<Setup> {
     if scale.model.is_none() {
-        return vec![ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
+        let large_in_card_memory = Setup { chip: EmulatedKind::Large, ..IN_CARD_MEMORY };
+        return vec![ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT, IN_CARD_MEMORY, large_in_card_memory];
     }
-    let alone = Setup { chip: scale.chip(), in_flight: 1, caches: scale.caches() };
-    let most = scale.chip().budget().in_flight;
-    let several = (most > 1).then_some(Setup { in_flight: most, ..alone });
-    std::iter::once(alone).chain(several).collect()
+    let budget = scale.chip().budget();
+    let order = GatherOrder::Sort;
+    let alone = Setup { chip: scale.chip(), order, in_flight: 1, caches: Some(scale.caches()) };
+    let several = (budget.in_flight > 1).then_some(Setup { in_flight: budget.in_flight, ..alone });
+    let waiting = Setup { order: GatherOrder::Buckets, ..alone };
+    let waiting = (budget.waiting_blocks > 0).then_some(waiting);
+    std::iter::once(alone).chain(several).chain(waiting).collect()
 }
 
 impl Setup {
     /// Point that renders all tiles of the frame with this setup.
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
-        let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
-        scale.on_one_chip(scene, settings, self.chip, self.caches)
+        let settings =
+            settings.with(|s| (s.schedule.in_flight, s.schedule.order) = (Some(self.in_flight), self.order));
+        scale.on_one_chip(scene, settings, self.chip, self.caches.unwrap_or_else(|| self.chip.caches()))
     }
 }
 
@@ -82,14 +94,16 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
     let heads = [
         ("scene", ""),
         ("chip", ""),
+        ("order", ""),
         ("on-chip memory", "KB"),
         ("tiles in flight", ""),
         ("gather queue", ""),
         ("drains", ""),
         ("photon map from DRAM", "GB"),
         ("scene from DRAM", "GB"),
+        ("waiting, read and written", "GB"),
         ("photon map: less than naive", "times"),
-        ("both: less than naive", "times"),
+        ("all: less than naive", "times"),
     ];
     let title = format!("All techniques at {} gather rays, whole frames", scale.gather_rays);
     let mut rows = Table::new(title, columns(&heads));
@@ -97,28 +111,31 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
         let naive = results.traffic(&naive(scale, scene));
         for setup in setups(scale) {
             let measured = results.traffic(&setup.point(scale, scene, scale.all_on()));
-            let [map, of_scene, both] =
+            let [map, of_scene, all] =
                 [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()]
                     .map(|estimate| estimate.value);
             let budget = setup.chip.budget();
             rows.push(vec![
                 name.into(),
                 setup.chip.name().into(),
+                setup.order.name().into(),
                 (budget.sram_bytes >> 10).into(),
                 setup.in_flight.into(),
                 budget.gather_queue.into(),
                 measured.total(|tile| tile.counters.drains as f64).value.into(),
                 (map / GIGA).into(),
                 (of_scene / GIGA).into(),
+                ((all - map - of_scene) / GIGA).into(),
                 (naive.photon_map_bytes().value / map).into(),
-                (naive.dram_bytes().value / both).into(),
+                (naive.dram_bytes().value / all).into(),
             ]);
         }
     }
     vec![
         text(
             "With one tile in flight a chip drains its queue at the end of every tile, however few gathers wait; with several, when \
-             the queue is full. A frame with several tiles in flight is rendered as a whole, on one chip.",
+             the queue is full. With the order buckets gathers wait in card memory, and caches take the memory that casting rays and \
+             doing gathers leave free. A frame with several tiles that wait is rendered as a whole, on one chip.",
         ),
         table("tiles-in-flight", rows),
     ]

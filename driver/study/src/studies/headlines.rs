@@ -9,7 +9,7 @@ use super::super::point::Point;
 use super::super::report::{Block, Figure, Table, slug};
 use super::super::sample::{Estimate, Ratio};
 use super::super::scale::Scale;
-use super::flights::LARGE_IN_FLIGHT;
+use super::flights::{IN_CARD_MEMORY, LARGE_IN_FLIGHT};
 use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, key, say, table, text};
 
 /// A simple and a large scene: file and name in the report.
@@ -24,7 +24,7 @@ type Line = (&'static str, fn(&Scale, &str, usize) -> Point);
 const NAIVE: Line = ("naive", |scale, scene, photons| {
     scale.traffic(scene, scale.settings(GatherOrder::Naive).with(|s| s.photons.count = photons))
 });
-const LINES: [Line; 4] = [
+const LINES: [Line; 5] = [
     NAIVE,
     ("sort, lines, largest tiles", |scale, scene, photons| {
         let settings = scale.settings(GatherOrder::Sort).with(|s| {
@@ -39,6 +39,9 @@ const LINES: [Line; 4] = [
     }),
     ("all techniques, tiles in flight, large chip", |scale, scene, photons| {
         LARGE_IN_FLIGHT.point(scale, scene, scale.all_on().with(|s| s.photons.count = photons))
+    }),
+    ("all techniques, gathers in card memory", |scale, scene, photons| {
+        IN_CARD_MEMORY.point(scale, scene, scale.all_on().with(|s| s.photons.count = photons))
     }),
 ];
 
@@ -108,7 +111,7 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
         ("from", "times"),
         ("to", "times"),
     ];
-    let title = format!("Photon map and scene from DRAM at {} gather rays", scale.gather_rays);
+    let title = format!("Bytes from DRAM at {} gather rays", scale.gather_rays);
     let mut rows = Table::new(title, columns(&heads));
     for headline in Headline::all(scale) {
         let factor = headline.factor(scale, results);
@@ -133,7 +136,8 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
     vec![
         text(format!(
             "All techniques: sort, combined sampling, irradiance cache, photons in leaves that fill a line. Renders with tiles in \
-             flight are whole frames on one large chip, with a scene cache of 128 KB.{published}"
+             flight are whole frames on one large chip, with a scene cache of 128 KB; those with gathers in card memory are on one \
+             reference chip, and count what waits.{published}"
         )),
         table("headlines", rows),
     ]

@@ -5,7 +5,8 @@ mod technique;
 mod worth;
 
 use self::technique::{
-    ALL_IN_LINES, ALL_ON_LARGE, CACHE, COMBINED, EXACT, MAX_TRAFFIC_RAYS, NAIVE, TECHNIQUES, TILED, Technique,
+    ALL_IN_CARD_MEMORY, ALL_IN_LINES, ALL_ON_LARGE, CACHE, COARSE_IN_CARD_MEMORY, COMBINED, EXACT,
+    MAX_TRAFFIC_RAYS, NAIVE, TECHNIQUES, TILED, Technique,
 };
 use self::worth::{AtQuality, Measured};
 use super::super::laboratory::Results;
@@ -103,7 +104,7 @@ fn at_equal_rays(measured: &Measured, name: &str) -> Table {
 }
 
 fn bytes(measured: &Measured, name: &str) -> Table {
-    let heads = [("technique", ""), ("photon map", "GB"), ("scene", "GB"), ("both", "GB")];
+    let heads = [("technique", ""), ("photon map", "GB"), ("scene", "GB"), ("all", "GB")];
     let rays = measured.scale.gather_rays;
     let title = format!("{name}: bytes from DRAM of a frame at {rays} gather rays");
     let mut table = Table::new(title, columns(&heads));
@@ -181,8 +182,8 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
     plot(file, &format!("{name}: error of indirect light by traffic"), caption, vec![axes])
 }
 
-/// Table of three combinations in all scenes: exact reordering, all techniques on the reference chip, and all
-/// techniques on the large chip with several tiles in flight.
+/// Table of combinations in all scenes: exact reordering, all techniques on the reference chip, on the large
+/// chip with several tiles in flight, and with gathers in card memory.
 fn together(scenes: &[(Measured, &str)]) -> Table {
     let heads = [
         ("scene", ""),
@@ -194,11 +195,10 @@ fn together(scenes: &[(Measured, &str)]) -> Table {
         ("from", "times"),
         ("to", "times"),
     ];
-    let title =
-        "Photon map and scene together, against naive; several tiles in flight: whole frames on one chip";
+    let title = "All bytes from DRAM, against naive; tiles in flight and gathers in card memory: whole frames on one chip";
     let mut table = Table::new(title, columns(&heads));
     for (measured, name) in scenes {
-        for technique in [&EXACT, &ALL_IN_LINES, &ALL_ON_LARGE] {
+        for technique in [&EXACT, &ALL_IN_LINES, &ALL_ON_LARGE, &ALL_IN_CARD_MEMORY, &COARSE_IN_CARD_MEMORY] {
             let equal_rays = measured.traffic(technique, measured.scale.gather_rays).dram_bytes();
             let mut row = vec![
                 (*name).into(),

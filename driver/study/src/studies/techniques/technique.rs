@@ -6,7 +6,7 @@ use photoncard_render::{Radiance, RenderSettings, Sampling};
 
 use super::super::super::point::Point;
 use super::super::super::scale::{IRRADIANCE_ERROR, REFERENCE_TILE, Scale, TILE};
-use super::super::flights::{LARGE_IN_FLIGHT, Setup};
+use super::super::flights::{IN_CARD_MEMORY, LARGE_IN_FLIGHT, Setup};
 
 /// A combination of techniques.
 pub(super) struct Technique {
@@ -18,8 +18,8 @@ pub(super) struct Technique {
     pub(super) radiance: Radiance,
     pub(super) layout: PhotonLayout,
     pub(super) tile: u32,
-    /// Chip that renders all tiles, several in flight, to measure the technique. `None` to measure a sample
-    /// of the tiles on reference chips, one at a time.
+    /// Chip that renders all tiles, several of which wait together, to measure the technique. `None` to
+    /// measure a sample of the tiles on reference chips, one at a time.
     pub(super) in_flight: Option<Setup>,
 }
 
@@ -64,9 +64,19 @@ pub(super) const ALL_ON_LARGE: Technique = Technique {
     in_flight: Some(LARGE_IN_FLIGHT),
     ..ALL_IN_LINES
 };
+pub(super) const ALL_IN_CARD_MEMORY: Technique = Technique {
+    name: "all techniques, lines, gathers in card memory",
+    in_flight: Some(IN_CARD_MEMORY),
+    ..ALL_IN_LINES
+};
+pub(super) const COARSE_IN_CARD_MEMORY: Technique = Technique {
+    name: "all techniques, lines, gathers in card memory, cache error 0.1",
+    irradiance_error: Some(0.1),
+    ..ALL_IN_CARD_MEMORY
+};
 /// Combinations that are measured. Those with the irradiance cache have square tiles, because the pixels of a
 /// row share few irradiance records.
-pub(super) const TECHNIQUES: [Technique; 13] = [
+pub(super) const TECHNIQUES: [Technique; 15] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
     TILED,
@@ -88,6 +98,8 @@ pub(super) const TECHNIQUES: [Technique; 13] = [
         ..ALL_IN_LINES
     },
     ALL_ON_LARGE,
+    ALL_IN_CARD_MEMORY,
+    COARSE_IN_CARD_MEMORY,
 ];
 
 impl Technique {
