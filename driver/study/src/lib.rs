@@ -69,7 +69,7 @@ pub struct StudyOptions {
     pub threads: Option<usize>,
     /// Provenance of the numbers. Each report adds its settings.
     pub provenance: Provenance,
-    /// Whether all points are measured, those of a part, or none.
+    /// Points to measure: all, those of a part, or none.
     pub extent: Extent,
 }
 
@@ -142,7 +142,7 @@ pub struct SweepOptions {
     pub threads: Option<usize>,
     /// Provenance of the numbers. The report adds its settings.
     pub provenance: Provenance,
-    /// Whether all points are measured, those of a part, or none.
+    /// Points to measure: all, those of a part, or none.
     pub extent: Extent,
 }
 

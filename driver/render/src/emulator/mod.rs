@@ -1,6 +1,6 @@
 //! Emulated cards: the firmware runs on threads of this process, one chip and one loopback link per thread.
 
-mod chip_file;
+mod capacities;
 pub mod contents;
 pub mod direct;
 mod dram;
@@ -28,7 +28,7 @@ use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
-pub use self::chip_file::{Capacities, ChipError, MIN_DRAM_BYTES, SramParts};
+pub use self::capacities::{Capacities, ChipError, MIN_DRAM_BYTES, SramParts};
 use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};

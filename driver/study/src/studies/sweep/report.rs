@@ -259,7 +259,7 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     axis.values.iter().map(number).collect()
 }
 
-/// What a frame demands of the hardware.
+/// Demand of a frame on the hardware.
 struct Demand {
     /// Time that the memory of one chip takes, seconds.
     memory: f64,
