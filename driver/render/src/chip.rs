@@ -243,14 +243,8 @@ fn place(error: &ChipError, content: &DeTable, table: Range<usize>) -> Refusal {
 /// The caches `own`, with the stated ones in their place.
 fn caches(content: &DeTable, own: CacheSettings) -> Result<CacheSettings, Refusal> {
     let mut caches = own;
-    // A cache for everything comes first: others beside it are refused. The index is of all.
-    let rank = |name: &str| match name {
-        "unified" => 0,
-        "index" => 2,
-        _ => 1,
-    };
     let mut stated: Vec<_> = content.iter().collect();
-    stated.sort_by_key(|(name, _)| rank(name.get_ref()));
+    stated.sort_by_key(|(name, _)| CacheSettings::rank(name.get_ref()));
     for (name, value) in stated {
         let refused = |reason| (value.span(), format!("[caches] {}: {reason}", name.get_ref()));
         let Some(text) = value.get_ref().as_str() else {

@@ -125,47 +125,26 @@ impl FromStr for CacheSettings {
     /// are left out have default values. The parts `casting` and `gathering` ([`CachesByWork`]) come
     /// together, and there are none by default.
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut photon = None;
-        let mut scene = None;
-        let mut unified = None;
-        let mut casting = None;
-        let mut gathering = None;
-        let mut index = None;
+        let mut stated: Vec<(&str, &str)> = Vec::new();
         for part in text.split(',') {
-            let (name, value) = part.split_once('=').ok_or_else(|| usage(part))?;
-            let taken = match name {
-                "photon" => photon.replace(cache(value)?).is_some(),
-                "scene" => scene.replace(cache(value)?).is_some(),
-                "unified" => unified.replace(cache(value)?).is_some(),
-                "casting" => casting.replace(cache(value)?).is_some(),
-                "gathering" => gathering.replace(cache(value)?).is_some(),
-                "index" => index.replace(set_index(value)?).is_some(),
-                _ => return Err(usage(part)),
-            };
-            if taken {
+            let known = part.split_once('=').filter(|(name, _)| Self::PARTS.contains(name));
+            let (name, value) = known.ok_or_else(|| usage(part))?;
+            if stated.iter().any(|(other, _)| *other == name) {
                 return Err(format!("{name} is given twice"));
             }
+            stated.push((name, value));
         }
-        let index = index.unwrap_or_default();
-        let with_index = |spec: CacheSpec| CacheSpec { index, ..spec };
-        let by_work = match (casting, gathering) {
-            (Some(casting), Some(gathering)) => {
-                Some(CachesByWork { casting: with_index(casting), gathering: with_index(gathering) })
-            }
-            (None, None) => None,
-            _ => return Err("casting and gathering are two kinds of work: give a cache for each".into()),
-        };
-        match unified {
-            Some(_) if photon.is_some() || scene.is_some() || by_work.is_some() => {
-                Err("unified replaces all other caches: give unified, or the others".into())
-            }
-            Some(unified) => Ok(Self::Unified(with_index(unified))),
-            None => Ok(Self::Split {
-                photon: with_index(photon.unwrap_or(CacheSpec::PHOTON)),
-                scene: with_index(scene.unwrap_or(CacheSpec::SCENE)),
-                by_work,
-            }),
+        let states = |name: &str| stated.iter().any(|(stated, _)| *stated == name);
+        if states("casting") != states("gathering") {
+            return Err("casting and gathering are two kinds of work: give a cache for each".into());
         }
+        let placeholder = CachesByWork { casting: CacheSpec::PHOTON, gathering: CacheSpec::PHOTON };
+        let by_work = states("casting").then_some(placeholder);
+        let base = Self::Split { photon: CacheSpec::PHOTON, scene: CacheSpec::SCENE, by_work };
+        stated.sort_by_key(|(name, _)| Self::rank(name));
+        stated.into_iter().try_fold(base, |caches, (name, value)| {
+            caches.with_part(name, value).unwrap_or_else(|| Err(usage(name)))
+        })
     }
 }
 
@@ -222,6 +201,16 @@ impl CacheSettings {
     pub(crate) const PARTS: [&'static str; 6] =
         ["photon", "scene", "unified", "casting", "gathering", "index"];
 
+    /// Order in which parts are replaced: a cache for everything comes first, so that others beside it are
+    /// refused, and the index of all caches last.
+    pub(crate) fn rank(name: &str) -> u8 {
+        match name {
+            "unified" => 0,
+            "index" => 2,
+            _ => 1,
+        }
+    }
+
     /// Replaces the part `name` by the one in `text`; `None` if there is no such part.
     pub(crate) fn with_part(mut self, name: &str, text: &str) -> Option<Result<Self, String>> {
         if !Self::PARTS.contains(&name) {
@@ -239,7 +228,7 @@ impl CacheSettings {
                 cache(text).map(|spec| caches.gathering = spec)
             }
             (_, Self::Split { .. }) => Err("no block waits on this chip: leave it out".to_owned()),
-            _ => Err("unified replaces all other caches: leave it or unified out".to_owned()),
+            _ => Err("unified replaces all other caches: give unified, or the others".to_owned()),
         };
         Some(replaced.map(|()| self))
     }
