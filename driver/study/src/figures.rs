@@ -9,6 +9,7 @@ use photoncard_picture::output;
 use photoncard_render::PROGRAM;
 use photoncard_shared::image::LAYOUT_VERSION;
 
+use super::dissertation;
 use super::error::StudyError;
 use super::laboratory::Laboratory;
 use super::point::Point;
@@ -76,6 +77,19 @@ pub(super) fn write(
     let csv = figures_csv(&figures);
     output::write(&folder.join(FIGURES), csv.as_bytes()).map_err(ReportError::from)?;
     Ok(())
+}
+
+/// Writes the claims of the dissertation, compared with `figures`, as `dissertation.md` into `folder`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write_claims(folder: &Path, figures: &[Figure]) -> Result<(), StudyError> {
+    let measured = |name: &str, scene: &str| {
+        let figure = figures.iter().find(|figure| figure.name == name && figure.scene == scene)?;
+        Some(dissertation::Measured { value: figure.value.number()?, interval: figure.interval })
+    };
+    let page = dissertation::page(&measured);
+    Ok(output::write(&folder.join("dissertation.md"), page.as_bytes()).map_err(ReportError::from)?)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 mod axes;
+pub mod dissertation;
 mod error;
 mod figures;
 mod host;
@@ -74,8 +75,8 @@ pub struct StudyOptions {
 }
 
 /// Measures the points of all studies, and writes a report for each study and `figures.csv` with the key
-/// figures of all. Results are stored in the folder `points` of [`StudyOptions::out`], so that a later run
-/// does not measure the same points again.
+/// figures of all. A collection of the nominal scale has the page [`dissertation`] too. Results are stored in
+/// the folder `points` of [`StudyOptions::out`], so that a later run does not measure the same points again.
 ///
 /// # Errors
 /// If a scene is missing, a point cannot be measured, a file cannot be written, the observer stops the study,
@@ -105,7 +106,10 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
         index::write(&options.out, options.scale.banner(), &reports, &options.provenance)?;
     }
     let check = check(&mut laboratory)?;
-    let figures = reports.into_iter().flat_map(|(_, report)| report.figures);
+    let figures: Vec<_> = reports.into_iter().flat_map(|(_, report)| report.figures).collect();
+    if options.is_collection && options.scale.is_nominal() {
+        figures::write_claims(&options.out, &figures)?;
+    }
     figures::write(&options.out, &options.scale, check, figures)
 }
 

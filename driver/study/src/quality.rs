@@ -75,20 +75,39 @@ impl Quality {
         Self { tiles: others.map(|(_, error)| *error).collect() }
     }
 
+    /// Adds the errors of renders of the same tiles, such as those with several seeds, tile by tile.
+    #[must_use]
+    pub(crate) fn pooled<'a>(renders: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut pooled = Self::default();
+        for Self { tiles } in renders {
+            pooled.tiles.resize(tiles.len(), TileDeviation::default());
+            for (sum, tile) in pooled.tiles.iter_mut().zip(tiles) {
+                *sum = sum.plus(tile);
+            }
+        }
+        pooled
+    }
+
     fn total(&self) -> TileDeviation {
-        self.tiles.iter().fold(TileDeviation::default(), |sum, tile| TileDeviation {
-            pixels: sum.pixels + tile.pixels,
-            squares: sum.squares + tile.squares,
-            noise: sum.noise + tile.noise,
-            sum: sum.sum + tile.sum,
-            reference: sum.reference + tile.reference,
-        })
+        self.tiles.iter().fold(TileDeviation::default(), TileDeviation::plus)
     }
 
     fn relative(&self, squares: f64) -> f64 {
         let TileDeviation { pixels, reference, .. } = self.total();
         let channels = 3.0 * pixels as f64;
         (squares / channels).sqrt() / (reference / channels)
+    }
+}
+
+impl TileDeviation {
+    fn plus(self, other: &Self) -> Self {
+        Self {
+            pixels: self.pixels + other.pixels,
+            squares: self.squares + other.squares,
+            noise: self.noise + other.noise,
+            sum: self.sum + other.sum,
+            reference: self.reference + other.reference,
+        }
     }
 }
 

@@ -38,6 +38,8 @@ pub struct Scale {
     pub least_tiles: usize,
     /// Number of tiles of 16x16 pixels that are compared with a reference.
     pub quality_tiles: usize,
+    /// Number of seeds with which these tiles are compared. Each has photons and a reference of its own.
+    pub quality_seeds: u32,
     /// Number of final gather rays per pixel of the reference.
     pub reference_rays: u32,
     /// True if studies vary their settings over fewer values ([`Self::pick`]).
@@ -62,6 +64,7 @@ impl Scale {
         sample: SampleRate::ALL,
         least_tiles: 15,
         quality_tiles: 48,
+        quality_seeds: 4,
         reference_rays: 1600,
         is_quick: false,
         machine: Machine::NOMINAL,
@@ -78,6 +81,7 @@ impl Scale {
         sample: SampleRate::ALL,
         least_tiles: 15,
         quality_tiles: 8,
+        quality_seeds: 2,
         reference_rays: 400,
         is_quick: true,
         machine: Machine::NOMINAL,
@@ -223,10 +227,17 @@ impl Scale {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
 
-    /// Point that measures the error of the pixels of [`Self::quality_tiles`] tiles.
-    pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
+    /// Points that measure the error of the pixels of [`Self::quality_tiles`] tiles, one for each of
+    /// [`Self::quality_seeds`].
+    pub fn quality(&self, scene: &str, settings: &RenderSettings) -> Vec<Point> {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
-        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
+        let first = settings.integrator.seed;
+        let point = |seed| {
+            let settings = settings.clone().with(|s| s.integrator.seed = seed);
+            let assignments = Vec::new();
+            Point { scene: scene.to_owned(), assignments, settings, is_along_curve: false, task }
+        };
+        (0..self.quality_seeds).map(|seed| point(first + seed)).collect()
     }
 
     /// Names and values of the settings that all points share, for a report's provenance.

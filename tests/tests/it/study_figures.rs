@@ -7,6 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use photoncard_driver::render::PROGRAM;
+use photoncard_driver::study::dissertation::{self, Measured};
 use photoncard_driver::study::{Figure, Laboratory, StudyObserver, check, human};
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde::Deserialize;
@@ -99,6 +100,26 @@ fn the_figures_of_the_document_equal_those_of_its_csv() {
     let differing = document.lines().zip(expected.lines()).find(|(is, expected)| is != expected);
     assert!(std::env::var_os("UPDATE_DOCS").is_some(), "{differing:?}");
     fs::write(documents().join("studies.md"), expected).expect("written");
+}
+
+/// `docs/dissertation.md` is the page of these figures. `UPDATE_DOCS=1` writes it.
+#[test]
+fn the_claims_of_the_dissertation_are_compared_with_the_figures_of_the_csv() {
+    let figures = figures(&read("studies.csv"));
+    let measured = |name: &str, scene: &str| {
+        let Line { value, lower, upper, .. } = figures.get(&(name.to_owned(), scene.to_owned()))?;
+        Some(Measured {
+            value: value.parse().ok()?,
+            interval: lower.zip(*upper).map(|(lower, upper)| [lower, upper]),
+        })
+    };
+    let expected = dissertation::page(&measured);
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(documents().join("dissertation.md"), &expected).expect("written");
+    }
+    let is = read("dissertation.md");
+    let differing = is.lines().zip(expected.lines()).find(|(is, expected)| is != expected);
+    assert!(is == expected, "{differing:?}");
 }
 
 struct Silent;

@@ -3,8 +3,10 @@
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonMapSize;
-use photoncard_render::cost_model::arithmetic::Arithmetic;
-use photoncard_render::cost_model::{Cost, Machine, Origin, Prediction, Resource, Symbols, Workload};
+use photoncard_render::cost_model::arithmetic::{Arithmetic, ChipPart};
+use photoncard_render::cost_model::{
+    ChipsNeeded, Cost, Machine, Origin, Prediction, Resource, Symbols, Workload,
+};
 
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
@@ -22,6 +24,9 @@ use super::workload::{self, cost, of_frame, tile_seconds};
 
 /// Maximum number of chips in the plots.
 const MAX_CHIPS: usize = 1024;
+
+/// Number of chips whose load balance is a key figure: "less than sixteen chips" (section 7.1).
+const BALANCED_CHIPS: usize = 16;
 
 /// A frame of the cost model.
 struct Frame {
@@ -47,30 +52,85 @@ struct Errors {
     scene: f64,
     /// Half-width of the confidence interval of the photon map's bytes read from DRAM.
     photon_map: f64,
+    /// Half-width of the confidence interval of all bytes.
+    bytes: f64,
+    /// Half-width of the confidence interval of FLOPs by Table 7.1's constants.
+    table_flops: f64,
+    /// Half-width of the confidence interval of counted FLOPs.
+    counted_flops: f64,
+}
+
+/// Values and ends of the confidence intervals of a frame's bytes and FLOPs.
+#[derive(Clone, Copy)]
+enum Side {
+    Lower = -1,
+    Value = 0,
+    Upper = 1,
+}
+
+/// A number that a prediction gives, with the ends of its confidence interval.
+fn predicted<T>(at: impl Fn(Side) -> T) -> [T; 3] {
+    [Side::Lower, Side::Value, Side::Upper].map(at)
+}
+
+/// Cell with a predicted number and half the width of its interval.
+fn predicted_cell(at: impl Fn(Side) -> f64) -> Cell {
+    let [first, value, last] = predicted(at);
+    if first == last { value.into() } else { Cell::interval(value, (last - first).abs() / 2.0) }
 }
 
 impl Errors {
-    fn of(measured: &Measurement) -> Self {
+    fn of(measured: &Measurement, symbols: &Symbols, order: GatherOrder) -> Self {
         let rays = measured.total(|TileMeasurement { counters, .. }| {
             (counters.eye_rays + counters.shadow_rays + counters.gather_rays + counters.survey_rays) as f64
         });
-        let estimates = [rays, measured.gathers(), measured.scene_bytes(), measured.photon_map_bytes()];
-        let [rays, gathers, scene, photon_map] = estimates.map(|estimate| estimate.half_width);
-        Self { rays, gathers, scene, photon_map }
+        // All costs are linear in a tile's counts, so that a frame's cost is the sum of its tiles'.
+        let bytes = measured.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64);
+        let table_flops =
+            measured.total(|tile| cost(&workload::of_tile(tile, symbols), symbols, order).total().flops);
+        let counted_flops = measured.total(|tile| workload::counted(tile, symbols).total().flops);
+        let [rays, gathers, scene, photon_map, bytes, table_flops, counted_flops] = [
+            rays,
+            measured.gathers(),
+            measured.scene_bytes(),
+            measured.photon_map_bytes(),
+            bytes,
+            table_flops,
+            counted_flops,
+        ]
+        .map(|estimate| estimate.half_width);
+        Self { rays, gathers, scene, photon_map, bytes, table_flops, counted_flops }
     }
 }
 
 impl Frame {
     /// Prediction by Table 7.1's constants.
     fn nominal_prediction(&self) -> Prediction {
-        Prediction::new(&self.workload, &self.cost, &self.machine)
+        self.nominal_prediction_at(Side::Value)
+    }
+
+    fn nominal_prediction_at(&self, side: Side) -> Prediction {
+        self.prediction_of(self.cost, self.errors.table_flops, side)
     }
 
     /// Prediction by counted arithmetic. Frames of Table 7.1 have no counts; they are predicted by the
     /// table's constants.
     fn prediction(&self) -> Prediction {
-        let cost = self.counted.as_ref().map_or(&self.cost, |(_, cost)| cost);
-        Prediction::new(&self.workload, cost, &self.machine)
+        self.prediction_at(Side::Value)
+    }
+
+    fn prediction_at(&self, side: Side) -> Prediction {
+        match &self.counted {
+            Some((_, cost)) => self.prediction_of(*cost, self.errors.counted_flops, side),
+            None => self.nominal_prediction_at(side),
+        }
+    }
+
+    fn prediction_of(&self, mut cost: Cost, flops_error: f64, side: Side) -> Prediction {
+        let sign = side as i8;
+        cost.gather_unit.dram_bytes += f64::from(sign) * self.errors.bytes;
+        cost.gather_unit.flops += f64::from(sign) * flops_error;
+        Prediction::new(&self.workload, &cost, &self.machine)
     }
 
     fn counted(&self) -> Option<CountedFrame<'_>> {
@@ -150,7 +210,7 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
                 workload,
                 cost,
                 counted,
-                errors: Errors::of(measured),
+                errors: Errors::of(measured, &symbols, point.settings.schedule.order),
                 map: measured.map,
                 machine: scale.machine,
             }
@@ -203,26 +263,74 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("Chips", on_chips),
         section("Load balance", load_balance(scale, results)),
     ];
-    let figures = figures(&frames);
+    let figures = figures(scale, results, &frames);
     Report { figures, ..page("Table 7.1: chips for a frame rate", introduction, sections) }
 }
 
-/// Key figures: number of chips needed for 30 frames/s by the frames with measured counts, naive and with all
-/// techniques, for each scene.
-fn figures(frames: &[Frame]) -> Vec<Figure> {
+/// Key figures of each scene, naive and with all techniques: chips for 30 frames/s, demand, and measured
+/// symbols of the table; and how well the tiles of the last divide among chips.
+fn figures(scale: &Scale, results: &Results, frames: &[Frame]) -> Vec<Figure> {
     let kinds = SCENES.iter().flat_map(|(scene, _)| ["naive", "all-techniques"].map(|kind| (*scene, kind)));
     let measured = frames.iter().filter(|frame| frame.counted.is_some());
     let of = |((scene, kind), frame): ((&str, &str), &Frame)| {
-        let [nominal, counted] =
-            [frame.nominal_prediction(), frame.prediction()].map(|p| p.chips_needed(30.0));
-        [
-            ("by-bandwidth", Cell::from(counted.bandwidth)),
-            ("by-table", nominal.overall.into()),
-            ("by-count", counted.overall.into()),
-        ]
-        .map(|(by, chips)| Figure::new(format!("table-7.1.chips-{by}.{kind}"), key(scene), chips, "chips"))
+        let mut figures = chips_figures(scene, kind, frame);
+        figures.extend(demand_figures(scene, kind, frame));
+        figures
     };
-    kinds.zip(measured).flat_map(of).collect()
+    let speedups = SCENES.iter().filter_map(|(scene, _)| {
+        let seconds = tile_seconds(results.traffic(&dealt(scale, scene)), &symbols(scale), &scale.machine);
+        let speedup = deal(&seconds, BALANCED_CHIPS, CREDITS[0])?.speedup();
+        Some(Figure::new(
+            format!("table-7.1.speed-up-of-{BALANCED_CHIPS}-chips"),
+            key(scene),
+            speedup,
+            "times",
+        ))
+    });
+    kinds.zip(measured).flat_map(of).chain(speedups).collect()
+}
+
+fn chips_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
+    let counted = predicted(|side| frame.prediction_at(side).chips_needed(30.0));
+    let nominal = predicted(|side| frame.nominal_prediction_at(side).chips_needed(30.0));
+    [
+        ("by-bandwidth", counted.map(|needed| Some(needed.bandwidth))),
+        ("by-table", nominal.map(|needed| needed.overall)),
+        ("by-count", counted.map(|needed| needed.overall)),
+    ]
+    .into_iter()
+    .map(|(by, [lower, chips, upper])| {
+        let figure = Figure::new(format!("table-7.1.chips-{by}.{kind}"), key(scene), chips, "chips");
+        match (lower, upper) {
+            (Some(lower), Some(upper)) => figure.within(lower as f64, upper as f64),
+            _ => figure,
+        }
+    })
+    .collect()
+}
+
+fn demand_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
+    let Frame { workload, errors, .. } = frame;
+    let Some(CountedFrame { arithmetic, .. }) = frame.counted() else { return Vec::new() };
+    let counted = |part| arithmetic.sum(|unit| unit.part() == part).flops();
+    let flops = arithmetic.sum(|_| true).flops();
+    // Of means over rays and gathers, the counts in numerator and denominator vary together.
+    [
+        ("teraflops", 30.0 * flops / 1e12, 30.0 * errors.counted_flops / 1e12, "TFLOPS"),
+        ("terabytes", 30.0 * frame.cost.total().dram_bytes / 1e12, 30.0 * errors.bytes / 1e12, "TB/s"),
+        ("million-rays", 30.0 * workload.rays() / 1e6, 30.0 * errors.rays / 1e6, "million/s"),
+        ("flops-of-a-ray", counted(ChipPart::RayCaster) / workload.rays(), 0.0, "FLOPs"),
+        ("flops-of-a-gather", counted(ChipPart::GatherUnit) / workload.gathers(), 0.0, "FLOPs"),
+        ("bytes-of-a-gather", workload.photon_map_bytes / workload.gathers(), 0.0, "bytes"),
+        ("interpolated-share", workload.interpolated_samples / workload.eye_rays, 0.0, ""),
+    ]
+    .into_iter()
+    .filter(|(_, value, ..)| value.is_finite())
+    .map(|(quantity, value, half_width, unit)| {
+        let figure = Figure::new(format!("table-7.1.{quantity}.{kind}"), key(scene), value, unit);
+        if half_width > 0.0 { figure.within(value - half_width, value + half_width) } else { figure }
+    })
+    .collect()
 }
 
 fn symbol_table() -> Table {
@@ -364,16 +472,16 @@ fn rates(frames: &[Frame]) -> Table {
     ];
     let mut table = Table::new("Demand of 30 frames/s, and tiles that one chip renders", columns(&heads));
     for frame in frames {
-        let total = frame.cost.total();
-        let prediction = frame.prediction();
+        let (total, errors) = (frame.cost.total(), frame.errors);
+        let counted = frame.counted.as_ref().map(|(_, cost)| cost.total().flops);
         table.push(vec![
             frame.name.as_str().into(),
-            (30.0 * total.flops / 1e12).into(),
-            (30.0 * total.dram_bytes / 1e12).into(),
-            frame.counted.as_ref().map(|(_, cost)| 30.0 * cost.total().flops / 1e12).into(),
-            prediction.bandwidth_tiles_per_second.into(),
-            prediction.computation_tiles_per_second.into(),
-            resource(prediction.binding(1)).into(),
+            within(30.0 * total.flops, 30.0 * errors.table_flops, 1e12),
+            within(30.0 * total.dram_bytes, 30.0 * errors.bytes, 1e12),
+            counted.map_or(Cell::Empty, |flops| within(30.0 * flops, 30.0 * errors.counted_flops, 1e12)),
+            predicted_cell(|side| frame.prediction_at(side).bandwidth_tiles_per_second),
+            predicted_cell(|side| frame.prediction_at(side).computation_tiles_per_second),
+            resource(frame.prediction().binding(1)).into(),
         ]);
     }
     table
@@ -391,17 +499,23 @@ fn chips(frames: &[Frame]) -> Table {
     ];
     let mut table = Table::new("Chips for 30 frames/s", columns(&heads));
     for frame in frames {
-        let needed = frame.nominal_prediction().chips_needed(30.0);
-        let prediction = frame.prediction();
-        let by_count = frame.counted.as_ref().map(|_| prediction.chips_needed(30.0));
+        let nominal = |of: fn(&ChipsNeeded) -> f64| {
+            predicted_cell(|side| of(&frame.nominal_prediction_at(side).chips_needed(30.0)))
+        };
+        let by_count = |of: fn(&ChipsNeeded) -> f64| {
+            predicted_cell(|side| of(&frame.prediction_at(side).chips_needed(30.0)))
+        };
+        let is_counted = frame.counted.is_some();
+        let is_carried = frame.prediction().chips_needed(30.0).overall.is_some();
+        let overall = |needed: &ChipsNeeded| needed.bandwidth.max(needed.computation) as f64;
         table.push(vec![
             frame.name.as_str().into(),
-            needed.bandwidth.into(),
-            needed.computation.into(),
-            needed.overall.into(),
-            by_count.map(|needed| needed.computation).into(),
-            by_count.and_then(|needed| needed.overall).into(),
-            (100.0 * prediction.link_load(30.0)).into(),
+            nominal(|needed| needed.bandwidth as f64),
+            nominal(|needed| needed.computation as f64),
+            if is_carried { nominal(overall) } else { Cell::Empty },
+            if is_counted { by_count(|needed| needed.computation as f64) } else { Cell::Empty },
+            if is_counted && is_carried { by_count(overall) } else { Cell::Empty },
+            (100.0 * frame.prediction().link_load(30.0)).into(),
         ]);
     }
     table

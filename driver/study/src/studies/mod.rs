@@ -115,6 +115,7 @@ mod tests {
     use photoncard_render::emulator::EmulatedKind;
     use photoncard_render::emulator::contents::Contents;
 
+    use super::super::dissertation::{self, Measured};
     use super::super::host::{Change, Changed};
     use super::super::laboratory::Outcome;
     use super::super::measure::{Measurement, ReadSums, TileMeasurement};
@@ -151,7 +152,7 @@ mod tests {
     }
 
     /// Page of a study with made-up outcomes.
-    fn page(study: Study, scale: &Scale) -> String {
+    fn report_of(study: Study, scale: &Scale) -> Report {
         let counters =
             Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
         let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
@@ -175,7 +176,25 @@ mod tests {
         };
         let points = study.points(scale).into_iter();
         let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
-        study.report(scale, &results, &[(); 9].map(|()| host_frame())).to_html()
+        study.report(scale, &results, &[(); 9].map(|()| host_frame()))
+    }
+
+    fn page(study: Study, scale: &Scale) -> String {
+        report_of(study, scale).to_html()
+    }
+
+    #[test]
+    fn every_claim_of_the_dissertation_names_figures_that_the_studies_measure() {
+        let figures: Vec<_> =
+            Study::ALL.iter().flat_map(|study| report_of(*study, &Scale::FULL).figures).collect();
+        let measured = |name: &str, scene: &str| {
+            figures
+                .iter()
+                .any(|figure| figure.name == name && figure.scene == scene)
+                .then_some(Measured { value: 1.0, interval: None })
+        };
+        let page = dissertation::page(&measured);
+        assert!(!page.contains("not measured"), "{page}");
     }
 
     #[test]

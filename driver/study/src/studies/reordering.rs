@@ -9,13 +9,13 @@ use photoncard_render::emulator::memory_model::{CacheSettings, CacheSpec};
 use super::super::laboratory::Results;
 use super::super::measure::Measurement;
 use super::super::point::{ALONG_CURVE, Point};
-use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
+use super::super::report::{Block, Cell, Column, Figure, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::{Scale, TILE};
 use super::overlap;
 use super::present::{
-    CORNELL, GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section,
-    series, table, text,
+    CORNELL, GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, key, page, panel, plot, say,
+    section, series, table, text,
 };
 use super::times::{self, TimedFrame};
 
@@ -151,7 +151,27 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("Size of the photon cache", by_size(scale, results)),
         section("Associativity and index", by_associativity(scale, results)),
     ];
-    page("Reordering photon gathers", introduction, sections)
+    let figures = figures(&nominal);
+    Report { figures, ..page("Reordering photon gathers", introduction, sections) }
+}
+
+/// Key figures: bytes of the photon map by the order of gathers, in Jensen's layout with the chip's caches.
+fn figures<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Vec<Figure> {
+    let figure = |quantity: &str, order, bytes: Estimate| {
+        let Estimate { value, half_width } = bytes.scaled(1.0 / GIGA);
+        let name = format!("reordering.{quantity}.{}", name(order));
+        Figure::new(name, key(CORNELL), value, "GB").within(value - half_width, value + half_width)
+    };
+    let naive = Some(GatherOrder::Naive);
+    let raw = figure("raw-gigabytes", naive, nominal(naive, PhotonLayout::Jensen).raw_bytes());
+    let of_order =
+        |order| figure("gigabytes", order, nominal(order, PhotonLayout::Jensen).photon_map_bytes());
+    let requested = nominal(naive, PhotonLayout::Jensen);
+    let of_gather = requested.raw_bytes().value / requested.gathers().value;
+    let of_gather = Figure::new("reordering.raw-bytes-of-a-gather.naive", key(CORNELL), of_gather, "bytes");
+    let bound = nominal(None, PhotonLayout::Lines).photon_map_bytes();
+    let bound = Figure::new("reordering.gigabytes.hilbert-lines", key(CORNELL), bound.value / GIGA, "GB");
+    ORDERS.map(Some).into_iter().chain([None]).map(of_order).chain([raw, of_gather, bound]).collect()
 }
 
 /// Table with a row for every order and layout, measured with the nominal caches.

@@ -37,7 +37,7 @@ pub(super) fn symbols_of(settings: &RenderSettings, measured: &Measurement) -> S
     Symbols { photons: measured.map.photons as f64, ..symbols(settings) }
 }
 
-fn of_tile(tile: &TileMeasurement, symbols: &Symbols) -> Workload {
+pub(super) fn of_tile(tile: &TileMeasurement, symbols: &Symbols) -> Workload {
     of(&|count: Count| count(tile), 1.0, symbols.tile_pixels, symbols)
 }
 
@@ -69,11 +69,16 @@ pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -
     if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
 }
 
+/// Cost of a tile by counted arithmetic.
+pub(super) fn counted(tile: &TileMeasurement, symbols: &Symbols) -> Cost {
+    let work = Work::new(&tile.counters, &tile.contents, symbols.gather_rays);
+    Cost::counted(&of_tile(tile, symbols), &Arithmetic::of(&work))
+}
+
 /// Time that a chip takes for each tile, seconds: `max(bytes from DRAM / bandwidth, counted FLOPs / FLOPS)`.
 pub(super) fn tile_seconds(measured: &Measurement, symbols: &Symbols, machine: &Machine) -> Vec<f64> {
     let seconds = |tile: &TileMeasurement| {
-        let work = Work::new(&tile.counters, &tile.contents, symbols.gather_rays);
-        let cost = Cost::counted(&of_tile(tile, symbols), &Arithmetic::of(&work)).total();
+        let cost = counted(tile, symbols).total();
         (cost.dram_bytes / machine.bandwidth).max(cost.flops / machine.flops)
     };
     measured.tiles.iter().map(seconds).collect()

@@ -6,9 +6,10 @@ use photoncard_render::Sampling;
 
 use super::super::super::laboratory::Results;
 use super::super::super::point::Point;
-use super::super::super::sample::Estimate;
+use super::super::super::report::Figure;
+use super::super::super::sample::{Estimate, Ratio};
 use super::super::super::scale::Scale;
-use super::super::present::GLOSSY;
+use super::super::present::{GLOSSY, key};
 
 /// A line of the figure: order of the gathers, and sampling of the rays.
 pub(super) type Line = (GatherOrder, Sampling);
@@ -55,7 +56,23 @@ pub(super) fn curve(scale: &Scale, results: &Results, line: Line, is_cached: boo
 
 /// Ratio of the last value of a curve to its first.
 pub(super) fn change(curve: &[Estimate]) -> f64 {
-    curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
+    change_within(curve).value
+}
+
+/// Ratio of the last value of a curve to its first, with its confidence interval.
+fn change_within(curve: &[Estimate]) -> Ratio {
+    let [first, last] = [curve.first(), curve.last()].map(|end| end.copied().unwrap_or_default());
+    Ratio::new(last, first, 0.0)
+}
+
+/// Key figures of a curve: its change, with the confidence interval, and its spread. `name` returns the name
+/// of a quantity's figure.
+pub(super) fn figures(curve: &[Estimate], name: impl Fn(&str) -> String) -> [Figure; 2] {
+    let Ratio { value, lower, upper } = change_within(curve);
+    [
+        Figure::new(name("last-over-first"), key(GLOSSY), value, "").within(lower, upper),
+        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(curve), ""),
+    ]
 }
 
 /// Ratio of the maximum of a curve to its minimum.

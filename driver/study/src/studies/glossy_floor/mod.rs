@@ -3,7 +3,7 @@
 mod line;
 mod strip;
 
-use photoncard_cards::scheduler::GatherOrder::{DirectionBins, Hash, Sort};
+use photoncard_cards::scheduler::GatherOrder::{DirectionBins, Hash, Sort, Tiled};
 use photoncard_picture::choice::Choice;
 use photoncard_render::Sampling;
 
@@ -69,25 +69,33 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("The floor alone", strip::blocks(scale, results)),
     ];
     let mut figures = strip::figures(scale, results);
+    figures.push(reordering_over_exponent(scale, results));
     for (is_cached, _) in PANELS {
         figures.extend(LINES.iter().flat_map(|&line| picture_figures(scale, results, line, is_cached)));
     }
     Report { figures, ..page("Figure 6.17: a glossy floor", introduction, sections) }
 }
 
+/// Figure of what the order `hash` saves, compared with `tiled`, over what the greatest exponent saves of the
+/// order `tiled`, compared with the least.
+fn reordering_over_exponent(scale: &Scale, results: &Results) -> Figure {
+    let [tiled, hash] =
+        [Tiled, Hash].map(|order| curve(scale, results, (order, Sampling::Reflection), false));
+    let sum = |curve: &[Estimate]| curve.iter().map(|estimate| estimate.value).sum::<f64>();
+    let value = sum(&tiled) / sum(&hash) * change(&tiled);
+    Figure::new("figure-6.17.reordering-over-exponent", key(GLOSSY), value, "times")
+}
+
 /// Key figures of a line in one of the panels.
-fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> [Figure; 3] {
+fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Vec<Figure> {
     let curve = curve(scale, results, line, is_cached);
     let mean = |curve: &[Estimate]| {
         curve.iter().map(|estimate| estimate.value).sum::<f64>() / curve.len() as f64 / GIGA
     };
     let panel = if is_cached { "with-cache" } else { "without-cache" };
     let name = |quantity: &str| format!("figure-6.17.{quantity}.{panel}.{}", slug(&line_name(line)));
-    [
-        Figure::new(name("last-over-first"), key(GLOSSY), change(&curve), ""),
-        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
-        Figure::new(name("mean-gigabytes"), key(GLOSSY), mean(&curve), "GB"),
-    ]
+    let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), mean(&curve), "GB");
+    line::figures(&curve, name).into_iter().chain([mean]).collect()
 }
 
 fn panels(scale: &Scale, results: &Results, bytes: fn(&Measurement) -> Estimate) -> Vec<Panel> {

@@ -107,10 +107,7 @@ pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
             let curve = curve(scale, results, line);
             let name =
                 |quantity: &str| format!("figure-6.17.{quantity}.floor-alone.{}", slug(&line_name(line)));
-            [
-                Figure::new(name("last-over-first"), key(GLOSSY), change(&curve), ""),
-                Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
-            ]
+            line::figures(&curve, name)
         })
         .collect();
     figures.push(Figure::new("figure-6.17.verdict", key(GLOSSY), verdict(scale, results), ""));

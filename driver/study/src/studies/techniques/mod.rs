@@ -5,8 +5,8 @@ mod technique;
 mod worth;
 
 use self::technique::{
-    ALL_IN_CARD_MEMORY, ALL_IN_LINES, ALL_ON_LARGE, CACHE, COARSE_IN_CARD_MEMORY, COMBINED, EXACT,
-    MAX_TRAFFIC_RAYS, NAIVE, TECHNIQUES, TILED, Technique,
+    ALL_IN_LINES, ALL_ON_LARGE, BY_CACHE_ERROR, CACHE, COMBINED, EXACT, MAX_TRAFFIC_RAYS, NAIVE, TILED,
+    Technique, techniques,
 };
 use self::worth::{AtQuality, Measured};
 use super::super::laboratory::Results;
@@ -22,11 +22,11 @@ use super::present::{
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let mut points = Vec::new();
     for (scene, _) in SCENES {
-        for technique in &TECHNIQUES {
+        for technique in techniques() {
             let traffic = technique.traffic_sweep(scale).into_iter();
             points.extend(traffic.map(|rays| technique.traffic(scale, scene, rays)));
-            points
-                .extend(technique.sweep(scale).into_iter().map(|rays| technique.quality(scale, scene, rays)));
+            let quality = technique.sweep(scale).into_iter();
+            points.extend(quality.flat_map(|rays| technique.quality(scale, scene, rays)));
         }
     }
     points
@@ -41,18 +41,21 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         format!(
             "Quality is the root of the mean square error of indirect light, the light that gather rays bring from the photon map, of pixels \
              over all three channels, over its mean, against the same eye rays with {} gather rays by combined sampling and no irradiance \
-             cache, in {} tiles of 16x16 pixels; pixels that show an emitter or nothing are left out. Direct light is in none of the \
+             cache, in {} tiles of 16x16 pixels with each of {} seeds, which have photons and a reference of their own; pixels that show an emitter or nothing are left out. Direct light is in none of the \
              pictures that are compared: its noise is that of shadow rays. The reference's own noise is estimated and subtracted. Only \
              sampling, rays, the irradiance cache and precomputed irradiance change pixels. The \
              rays and bytes at equal quality lie on lines through the logarithms of error and rays, and of bytes and rays, the \
-             last of which goes on beyond {} rays. Factors have 95 % intervals, of the sampled tiles and by the jackknife over the tiles that \
+             last of which goes on beyond {} rays. Factors and rays have 95 % intervals, of the sampled tiles and by the jackknife over the tiles that \
              are compared.",
-            scale.reference_rays, scale.quality_tiles, MAX_TRAFFIC_RAYS
+            scale.reference_rays, scale.quality_tiles, scale.quality_seeds, MAX_TRAFFIC_RAYS
         ),
     ];
     let scenes = SCENES.map(|(scene, name)| (Measured { scale, results, scene }, name));
     let mut together = vec![table("together", together(&scenes))];
     together.extend(scenes.iter().map(|(measured, name)| text(format!("{name}: {}.", verdicts(measured)))));
+    together.extend(
+        scenes.iter().filter_map(|(measured, name)| Some(text(format!("{name}: {}", best_error(measured)?)))),
+    );
     if scale.is_nominal() {
         together.push(text(
             "The dissertation says almost two orders of magnitude for its three techniques together.",
@@ -88,7 +91,7 @@ fn at_equal_rays(measured: &Measured, name: &str) -> Table {
         "{name}: a frame at {rays} gather rays; RMSE of indirect light over its mean, mean over the same"
     );
     let mut table = Table::new(title, columns(&heads));
-    for technique in &TECHNIQUES {
+    for technique in techniques() {
         let traffic = measured.traffic(technique, rays);
         let quality = measured.quality(technique, rays);
         table.push(vec![
@@ -108,7 +111,7 @@ fn bytes(measured: &Measured, name: &str) -> Table {
     let rays = measured.scale.gather_rays;
     let title = format!("{name}: bytes from DRAM of a frame at {rays} gather rays");
     let mut table = Table::new(title, columns(&heads));
-    for technique in &TECHNIQUES {
+    for technique in techniques() {
         let traffic = measured.traffic(technique, rays);
         let bytes = [traffic.photon_map_bytes(), traffic.scene_bytes(), traffic.dram_bytes()];
         table.push(std::iter::once(technique.name.into()).chain(bytes.map(gigabytes)).collect());
@@ -138,6 +141,8 @@ fn at_equal_quality(measured: &Measured, name: &str) -> Table {
     let heads = [
         ("technique", ""),
         ("rays", ""),
+        ("rays from", ""),
+        ("rays to", ""),
         ("from DRAM", "GB"),
         ("less than naive", "times"),
         ("from", "times"),
@@ -147,14 +152,16 @@ fn at_equal_quality(measured: &Measured, name: &str) -> Table {
     let title =
         format!("{name}: what each technique is worth at the RMSE of the naive render, with 95 % intervals");
     let mut table = Table::new(title, columns(&heads));
-    for technique in &TECHNIQUES {
+    for technique in techniques() {
         let worth = measured.worth(technique);
         let note = match worth.at {
             AtQuality::Met(_) => "",
             AtQuality::AtMost(_) => "at least: better with the fewest rays",
             AtQuality::Missed(_) => "not reached with the most rays",
         };
-        let mut row = vec![technique.name.into(), worth.at.rays().into(), (worth.bytes.value / GIGA).into()];
+        let mut row = vec![Cell::from(technique.name)];
+        row.extend(ratio_cells(Some(worth.rays())));
+        row.push((worth.bytes.value / GIGA).into());
         row.extend(ratio_cells(measured.factor_at_quality(technique)));
         row.push(note.into());
         table.push(row);
@@ -170,7 +177,7 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
         };
         series(technique.name, technique.traffic_sweep(measured.scale).into_iter().map(on_curve).collect())
     };
-    let sampled = TECHNIQUES.iter().filter(|technique| technique.in_flight.is_none());
+    let sampled = techniques().filter(|technique| technique.in_flight.is_none());
     let axes = panel(
         "",
         ("from DRAM", "GB a frame", XScale::Log10),
@@ -198,7 +205,7 @@ fn together(scenes: &[(Measured, &str)]) -> Table {
     let title = "All bytes from DRAM, against naive; tiles in flight and gathers in card memory: whole frames on one chip";
     let mut table = Table::new(title, columns(&heads));
     for (measured, name) in scenes {
-        for technique in [&EXACT, &ALL_IN_LINES, &ALL_ON_LARGE, &ALL_IN_CARD_MEMORY, &COARSE_IN_CARD_MEMORY] {
+        for technique in [&EXACT, &ALL_IN_LINES, &ALL_ON_LARGE].into_iter().chain(&BY_CACHE_ERROR) {
             let equal_rays = measured.traffic(technique, measured.scale.gather_rays).dram_bytes();
             let mut row = vec![
                 (*name).into(),
@@ -212,6 +219,43 @@ fn together(scenes: &[(Measured, &str)]) -> Table {
         }
     }
     table
+}
+
+/// Technique with the fewest bytes at the naive render's error among those that differ in the error bound of
+/// the irradiance cache; `None` if no such technique reaches it.
+fn best_by_cache_error(measured: &Measured) -> Option<(&'static Technique, Ratio)> {
+    let factors = BY_CACHE_ERROR
+        .iter()
+        .filter_map(|technique| Some((technique, measured.factor_at_quality(technique)?)));
+    factors.max_by(|(_, first), (_, second)| first.value.total_cmp(&second.value))
+}
+
+/// Sentence that names the best error bound of the irradiance cache, and those whose intervals overlap with
+/// its own.
+fn best_error(measured: &Measured) -> Option<String> {
+    let error = |technique: &Technique| {
+        technique.irradiance_error.map_or_else(String::new, |error| error.to_string())
+    };
+    let (best, factor) = best_by_cache_error(measured)?;
+    let is_close = |technique: &&Technique| {
+        let other = measured.factor_at_quality(technique);
+        technique.name != best.name && other.is_some_and(|other| other.upper >= factor.lower)
+    };
+    let close: Vec<_> = BY_CACHE_ERROR.iter().filter(is_close).map(error).collect();
+    let close = if close.is_empty() {
+        "no other interval overlaps".to_owned()
+    } else {
+        format!("the interval of {} overlaps", close.join(", "))
+    };
+    Some(format!(
+        "with gathers in card memory and errors of the irradiance cache of {}, {} reads the fewest bytes at equal quality, {} times \
+         less than naive ({} to {}); {close}.",
+        BY_CACHE_ERROR.each_ref().map(error).join(", "),
+        error(best),
+        say(factor.value),
+        say(factor.lower),
+        say(factor.upper),
+    ))
 }
 
 /// Comparisons at equal quality whose outcome the report states in words: name, base, technique.
@@ -233,13 +277,14 @@ fn figures(measured: &Measured) -> Vec<Figure> {
         |name: &str, value: f64, unit| Figure::new(format!("techniques.{name}"), key(scene), value, unit);
     let mut figures =
         vec![figure("rmse", naive.rmse(), ""), figure("reference-noise", naive.reference_noise(), "")];
-    for technique in &TECHNIQUES {
+    for technique in techniques() {
         let slug = slug(technique.name);
         let bytes = measured.traffic(technique, scale.gather_rays).dram_bytes().scaled(1.0 / GIGA);
         let worth = measured.worth(technique);
         let gigabytes = figure(&format!("gigabytes.{slug}"), bytes.value, "GB");
         figures.push(gigabytes.within(bytes.value - bytes.half_width, bytes.value + bytes.half_width));
-        figures.push(figure(&format!("rays-at-equal-quality.{slug}"), worth.at.rays(), ""));
+        let Ratio { value, lower, upper } = worth.rays();
+        figures.push(figure(&format!("rays-at-equal-quality.{slug}"), value, "").within(lower, upper));
         let factor = measured.factor_at_equal_rays(technique);
         figures.push(
             figure(&format!("factor.{slug}"), factor.value, "times").within(factor.lower, factor.upper),
@@ -256,6 +301,18 @@ fn figures(measured: &Measured) -> Vec<Figure> {
             ),
         });
     }
+    let [tiled, cached] =
+        [&TILED, &CACHE].map(|technique| measured.traffic(technique, scale.gather_rays).dram_bytes());
+    let Ratio { value, lower, upper } = Ratio::new(cached, tiled, 0.0);
+    let saved = figure("saved-share.irradiance-cache", 1.0 - value, "");
+    figures.push(saved.within(1.0 - upper, 1.0 - lower));
+    let over_exact = measured.factor(&EXACT, &ALL_IN_LINES);
+    let named = figure("factor-over-exact-reordering.all-techniques", over_exact.value, "times");
+    figures.push(named.within(over_exact.lower, over_exact.upper));
+    let best = best_by_cache_error(measured).and_then(|(technique, _)| technique.irradiance_error);
+    figures.extend(
+        best.map(|error| Figure::new("techniques.best-cache-error", key(scene), error.to_string(), "")),
+    );
     figures.extend(COMPARISONS.map(|(name, base, technique)| {
         let name = format!("techniques.verdict.{}", slug(name));
         Figure::new(name, key(scene), measured.verdict(base, technique), "")

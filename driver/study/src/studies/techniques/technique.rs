@@ -69,14 +69,28 @@ pub(super) const ALL_IN_CARD_MEMORY: Technique = Technique {
     in_flight: Some(IN_CARD_MEMORY),
     ..ALL_IN_LINES
 };
-pub(super) const COARSE_IN_CARD_MEMORY: Technique = Technique {
-    name: "all techniques, lines, gathers in card memory, cache error 0.1",
-    irradiance_error: Some(0.1),
-    ..ALL_IN_CARD_MEMORY
-};
-/// Combinations that are measured. Those with the irradiance cache have square tiles, because the pixels of a
-/// row share few irradiance records.
-pub(super) const TECHNIQUES: [Technique; 15] = [
+/// All techniques with gathers in card memory, by ascending error bound of the irradiance cache.
+pub(super) const BY_CACHE_ERROR: [Technique; 4] = [
+    ALL_IN_CARD_MEMORY,
+    Technique {
+        name: "all techniques, lines, gathers in card memory, cache error 0.05",
+        irradiance_error: Some(0.05),
+        ..ALL_IN_CARD_MEMORY
+    },
+    Technique {
+        name: "all techniques, lines, gathers in card memory, cache error 0.1",
+        irradiance_error: Some(0.1),
+        ..ALL_IN_CARD_MEMORY
+    },
+    Technique {
+        name: "all techniques, lines, gathers in card memory, cache error 0.2",
+        irradiance_error: Some(0.2),
+        ..ALL_IN_CARD_MEMORY
+    },
+];
+/// Combinations with gathers on the chip. Those with the irradiance cache have square tiles, because the
+/// pixels of a row share few irradiance records.
+const ON_CHIP: [Technique; 13] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
     TILED,
@@ -98,9 +112,12 @@ pub(super) const TECHNIQUES: [Technique; 15] = [
         ..ALL_IN_LINES
     },
     ALL_ON_LARGE,
-    ALL_IN_CARD_MEMORY,
-    COARSE_IN_CARD_MEMORY,
 ];
+
+/// Combinations that are measured.
+pub(super) fn techniques() -> impl Iterator<Item = &'static Technique> {
+    ON_CHIP.iter().chain(&BY_CACHE_ERROR)
+}
 
 impl Technique {
     pub(super) fn settings(&self, scale: &Scale, gather_rays: u32) -> RenderSettings {
@@ -122,9 +139,9 @@ impl Technique {
         }
     }
 
-    /// Point that measures the technique's error. Techniques that differ only in order, layout or tiles share
-    /// the point, because these do not change pixels.
-    pub(super) fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
+    /// Points that measure the technique's error, one for each seed. Techniques that differ only in order,
+    /// layout or tiles share the points, because these do not change pixels.
+    pub(super) fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Vec<Point> {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
         let settings = settings.with(|s| {
@@ -132,7 +149,7 @@ impl Technique {
             s.schedule.order = shared.schedule.order;
             s.schedule.tile = shared.schedule.tile;
         });
-        scale.quality(scene, settings)
+        scale.quality(scene, &settings)
     }
 
     /// Returns whether the technique's pixels differ from those of the naive render.

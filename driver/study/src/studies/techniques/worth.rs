@@ -64,11 +64,33 @@ fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
 pub(super) struct Worth {
     /// Number of gather rays.
     pub(super) at: AtQuality,
+    /// Half-width of the 95 % interval of the logarithm of [`Self::at`], by the jackknife over the tiles in
+    /// which errors were measured.
+    rays_spread: f64,
     /// Bytes from DRAM.
     pub(super) bytes: Estimate,
-    /// Half-width of the 95 % interval of the bytes' logarithm, estimated from the tiles in which errors were
-    /// measured.
-    spread: f64,
+    /// Half-width of the 95 % interval of the bytes' logarithm, by the same jackknife.
+    bytes_spread: f64,
+}
+
+impl Worth {
+    /// Number of rays with its 95 % interval.
+    pub(super) fn rays(&self) -> Ratio {
+        let value = self.at.rays();
+        Ratio { value, lower: value / self.rays_spread.exp(), upper: value * self.rays_spread.exp() }
+    }
+}
+
+/// Errors of a technique by its number of rays, ascending.
+type Errors = Vec<(u32, Quality)>;
+
+/// Number of rays at which a technique with `errors` reaches the error of `naive`. Errors are those of all
+/// tiles except `omitted`.
+fn rays_at(errors: &Errors, naive: &Quality, omitted: Option<usize>) -> Option<AtQuality> {
+    let rmse =
+        |quality: &Quality| omitted.map_or_else(|| quality.rmse(), |tile| quality.without(tile).rmse());
+    let curve: Vec<_> = errors.iter().map(|(rays, quality)| [f64::from(*rays), rmse(quality)]).collect();
+    at_quality(&curve, rmse(naive))
 }
 
 /// Results for one scene.
@@ -84,8 +106,10 @@ impl Measured<'_> {
         self.results.traffic(&technique.traffic(self.scale, self.scene, rays))
     }
 
-    pub(super) fn quality(&self, technique: &Technique, rays: u32) -> &Quality {
-        self.results.quality(&technique.quality(self.scale, self.scene, rays))
+    /// Error of the technique with all seeds together.
+    pub(super) fn quality(&self, technique: &Technique, rays: u32) -> Quality {
+        let points = technique.quality(self.scale, self.scene, rays);
+        Quality::pooled(points.iter().map(|point| self.results.quality(point)))
     }
 
     /// Ratio of the naive render's bytes to those of a technique at equal rays.
@@ -97,40 +121,34 @@ impl Measured<'_> {
         Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
     }
 
-    /// Number of rays at which a technique reaches the naive render's error. Errors are those of all tiles
-    /// except `omitted`.
-    fn at_quality(&self, technique: &Technique, omitted: Option<usize>) -> AtQuality {
-        let rmse = |technique, rays| {
-            let quality = self.quality(technique, rays);
-            omitted.map_or_else(|| quality.rmse(), |tile| quality.without(tile).rmse())
-        };
-        let rays = technique.sweep(self.scale).into_iter();
-        let curve: Vec<_> = rays.map(|rays| [f64::from(rays), rmse(technique, rays)]).collect();
-        let gather_rays = self.scale.gather_rays;
-        at_quality(&curve, rmse(&NAIVE, gather_rays)).unwrap_or(AtQuality::Missed(f64::from(gather_rays)))
-    }
-
     pub(super) fn worth(&self, technique: &Technique) -> Worth {
+        let gather_rays = self.scale.gather_rays;
         let bytes = |rays| (f64::from(rays), self.traffic(technique, rays).dram_bytes());
         let curve: Vec<_> = technique.traffic_sweep(self.scale).into_iter().map(bytes).collect();
-        let at = self.at_quality(technique, None);
-        let tiles = 0..self.quality(technique, self.scale.gather_rays).tiles.len();
-        let without = |tile| bytes_at(&curve, self.at_quality(technique, Some(tile)).rays()).value.ln();
-        let spread = if technique.changes_pixels() {
-            jackknife_half_width(&tiles.map(without).collect::<Vec<_>>())
-        } else {
-            0.0
+        let error = |rays| (rays, self.quality(technique, rays));
+        let errors: Errors = technique.sweep(self.scale).into_iter().map(error).collect();
+        let naive = self.quality(&NAIVE, gather_rays);
+        let at =
+            |omitted| rays_at(&errors, &naive, omitted).unwrap_or(AtQuality::Missed(f64::from(gather_rays)));
+        let spread = |of: &dyn Fn(f64) -> f64| {
+            let without = (0..naive.tiles.len()).map(|tile| of(at(Some(tile)).rays()).ln());
+            if technique.changes_pixels() { jackknife_half_width(&without.collect::<Vec<_>>()) } else { 0.0 }
         };
-        Worth { at, bytes: bytes_at(&curve, at.rays()), spread }
+        Worth {
+            at: at(None),
+            rays_spread: spread(&|rays| rays),
+            bytes: bytes_at(&curve, at(None).rays()),
+            bytes_spread: spread(&|rays| bytes_at(&curve, rays).value),
+        }
     }
 
     /// Ratio of the bytes of `base` to those of `technique` at the naive render's error.
-    fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
+    pub(super) fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
         if technique.name == base.name {
             return Ratio::ONE;
         }
         let [base, worth] = [base, technique].map(|technique| self.worth(technique));
-        Ratio::new(base.bytes, worth.bytes, base.spread.hypot(worth.spread))
+        Ratio::new(base.bytes, worth.bytes, base.bytes_spread.hypot(worth.bytes_spread))
     }
 
     /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if the
