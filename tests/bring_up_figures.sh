@@ -60,7 +60,7 @@ sizes_of() {
         $1 == ".rodata" { constants = $2 }
         $1 == ".data" { data = $2 }
         $1 == ".bss" { zeroed = $2 }
-        END { print image, code, constants, data, zeroed, flash; exit !(code && constants && data) }'
+        END { print image, code, constants, data, zeroed, flash; exit !(code && constants && zeroed) }'
 }
 
 # 12345 as 12,345.

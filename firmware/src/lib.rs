@@ -5,10 +5,14 @@
 //!
 //! # Example
 //!
-//! A card consists of its firmware and its DRAM. In this example it answers a host's first message. On a real
-//! link, [`serve::serve`] moves the bytes.
+//! A card consists of its firmware and its DRAM. It is a static, as its buffers are larger than a chip's
+//! stack; all of its bytes are zero at first, so that it takes no place in flash. In this example it answers
+//! a host's first message. On a real link, [`serve::serve`] moves the bytes.
 //!
 //! ```
+//! // A chip has `static_cell::ConstStaticCell`, or another cell that is taken once, in place of the mutex.
+//! use std::sync::Mutex;
+//!
 //! use photoncard_firmware::card::MicroCard;
 //! use photoncard_firmware::kind::MICRO;
 //! use photoncard_firmware::memory::Dram;
@@ -17,8 +21,10 @@
 //! use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
 //! use photoncard_shared::transport::Transport;
 //!
-//! let mut dram = [Line::ZERO; 64];
-//! let mut card = MicroCard::new(Dram::new(&mut dram));
+//! static CARD: Mutex<MicroCard<Dram<'static>>> = Mutex::new(MicroCard::new(Dram::EMPTY));
+//!
+//! let mut card = CARD.lock().unwrap();
+//! *card.memory() = Dram::new(vec![Line::ZERO; 64].leak());
 //! let mut host = Transport::host();
 //! host.open(0x5eed);
 //! host.send(|payload| {
@@ -110,5 +116,6 @@ pub mod scene;
 pub mod self_test;
 pub mod serve;
 pub mod simd;
+mod slot;
 mod vector;
 mod wide_tree;

@@ -38,8 +38,9 @@ pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
-/// The card, initialised at compile time so that its buffers are never on the stack.
-static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::new(&mut [])));
+/// The card, initialised at compile time so that its buffers are never on the stack. All of its bytes are
+/// zero: it takes no place in flash.
+static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::EMPTY));
 
 // The card with the budget's caches and stack, and the port's buffer, fit the budget's SRAM.
 const _: () = assert!(sram_bytes::<Micro>() + port::STATIC_BYTES <= MICRO.sram_bytes as usize);

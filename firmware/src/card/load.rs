@@ -14,6 +14,7 @@ use crate::self_test::MemoryTester;
 pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
 /// State of the card image in memory, or of a memory test.
+#[repr(u8)]
 pub(super) enum ImageState {
     None,
     Loading(Loader),

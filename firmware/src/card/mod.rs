@@ -29,7 +29,9 @@ pub struct Card<K: ChipKind, M> {
 }
 
 impl<K: FixedKind, M: CardMemory> Card<K, M> {
-    /// Creates a card, before its first session.
+    /// Creates a card, before its first session. It has the size of its kind's buffers, 100 KB of a
+    /// [`MicroCard`]: on a chip it is the initial value of a static, with a memory such as [`Dram::EMPTY`],
+    /// and never on the stack.
     pub const fn new(memory: M) -> Self {
         const { check::<K>() };
         Self::with_chip(Chip::new(), memory)

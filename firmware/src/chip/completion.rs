@@ -26,6 +26,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
 use crate::render::features::{Features, features};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
+use crate::slot::Slot;
 
 /// Purpose for which the light of a path is computed.
 #[derive(Clone, Copy)]
@@ -85,7 +86,7 @@ impl<K: ChipKind> Flight<K> {
         }
         completion.next_path(self.paths(pixel).of_sample(sample));
         if completion.sample < frame.first_sample.saturating_add(frame.samples) {
-            self.completion = Some(completion);
+            self.completion = Slot::Full(completion);
             return Ok(None);
         }
         self.position.index += 1;
@@ -109,7 +110,7 @@ impl<K: ChipKind> Flight<K> {
         self.look_at(job, pixel, (Use::Probe, &mut completion))?;
         completion.next_path(1);
         if completion.sample < PROBES {
-            self.completion = Some(completion);
+            self.completion = Slot::Full(completion);
             return Ok(());
         }
         self.end_probes(job.frame, pixel, &completion.probes)?;

@@ -14,6 +14,7 @@ use crate::irradiance_cache::{IrradianceCache, Window};
 use crate::kind::{Buffer, Capacity, ChipKind, Vacant};
 use crate::memory::{MemoryPort, WordReader, WordWriter};
 use crate::render::PixelSample;
+use crate::slot::Slot;
 
 /// Capacity of the stack of blocks, sufficient for all halvings of a tile.
 pub(super) const MAX_BLOCKS: usize = 32;
@@ -45,7 +46,7 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of paths per sample, by pixel of the block.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
     /// State of the pixel that is being completed, or whose probes are traced.
-    pub(super) completion: Option<Completion>,
+    pub(super) completion: Slot<Completion>,
 }
 
 impl<K: ChipKind> Vacant for Flight<K> {
@@ -61,7 +62,7 @@ impl<K: ChipKind> Vacant for Flight<K> {
         cache: IrradianceCache::new(),
         sums: Buffer::EMPTY,
         paths: Buffer::EMPTY,
-        completion: None,
+        completion: Slot::Empty,
     };
 }
 
@@ -94,7 +95,7 @@ impl<K: ChipKind> Flight<K> {
         self.waiting = 0;
         self.block_number = None;
         self.tile_number = 0;
-        self.completion = None;
+        self.completion = Slot::Empty;
     }
 
     /// Goes on with a tile whose remaining blocks are `blocks`.

@@ -35,13 +35,14 @@ pub enum Event {
 
 /// Delivery state of an outgoing message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 enum Passage {
+    /// The message has arrived at the other end, but is not taken there.
+    Held = 0,
     /// The message is to be sent; `again` is true if it was sent before.
     Waiting { again: bool },
     /// The message was sent by the transmission with this number.
     Sent { transmission: u16 },
-    /// The message has arrived at the other end, but is not taken there.
-    Held,
 }
 
 /// An outgoing message in flight.
@@ -59,8 +60,9 @@ struct Incoming {
 
 /// Next frame to be sent that carries no message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub(super) enum Control {
-    Acknowledge,
+    Acknowledge = 1,
     Probe,
     Answer,
     /// Reply to a frame of the unknown session with this number.
@@ -70,8 +72,8 @@ pub(super) enum Control {
 /// Role of an end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
-    Host,
     Card,
+    Host,
 }
 
 pub(super) struct LinkSession {

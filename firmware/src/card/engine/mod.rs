@@ -21,6 +21,7 @@ use crate::memory::CardMemory;
 use crate::render::RenderJob;
 use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
+use crate::slot::Slot;
 
 /// Maximum number of queued tile commands of a card, whatever its kind of chip.
 pub const MAX_TILES: usize = MAX_WAITING_BLOCKS as usize;
@@ -34,7 +35,7 @@ pub(super) struct Engine<K: ChipKind> {
     /// Number of leading lines of card memory that were written since the card was switched on.
     written: u32,
     checksums: Option<Checksums>,
-    frame: Option<FrameParameters>,
+    frame: Slot<FrameParameters>,
     /// Tiles that the chip has not begun.
     tiles: Deque<Tile, MAX_TILES>,
     /// Number of tiles that the chip has begun and whose [`Reply::TileDone`] was not sent yet.
@@ -64,7 +65,7 @@ impl<K: ChipKind> Engine<K> {
             measure: None,
             written: 0,
             checksums: None,
-            frame: None,
+            frame: Slot::Empty,
             tiles: Deque::new(),
             begun: 0,
             finished: None,
@@ -121,7 +122,7 @@ impl<K: ChipKind> Engine<K> {
                 let room = scene.header.lines..memory.lines();
                 self.drop_tiles();
                 self.chip.begin_frame(&frame, room);
-                self.frame = Some(frame);
+                self.frame = Slot::Full(frame);
                 Ok(Some(Reply::FrameAccepted))
             }
             Command::RenderTile(tile) => self.accept(tile).map(|()| None),
@@ -161,7 +162,7 @@ impl<K: ChipKind> Engine<K> {
     fn forget(&mut self) {
         self.image = ImageState::None;
         self.checksums = None;
-        self.frame = None;
+        self.frame = Slot::Empty;
         self.chip.forget_records();
         self.drop_tiles();
     }
@@ -199,7 +200,7 @@ impl<K: ChipKind> Engine<K> {
     }
 
     fn accept(&mut self, tile: Tile) -> Result<(), Fault> {
-        let frame = self.frame.ok_or(OUT_OF_ORDER)?;
+        let frame = *self.frame.as_ref().ok_or(OUT_OF_ORDER)?;
         let fits =
             |first: u32, count: u32, size: u32| first.checked_add(count).is_some_and(|end| end <= size);
         let is_inside = fits(tile.x, tile.width, frame.width) && fits(tile.y, tile.height, frame.height);
