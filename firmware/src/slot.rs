@@ -1,7 +1,8 @@
 //! Place for a value that is there or not.
 
-/// Place for a value. Unlike those of `Option`, the bytes of an empty slot are zero in constants, so that a
-/// static card is zeroed memory and takes no place in flash.
+/// Place for a value. The bytes of an empty slot are zero in constants, unlike those of an `Option` whose
+/// empty state is a niche of the value, such as a Boolean's 2. A static card is zeroed memory, and takes no
+/// place in flash.
 #[repr(u8)]
 pub(crate) enum Slot<T> {
     Empty = 0,

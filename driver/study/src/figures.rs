@@ -13,7 +13,7 @@ use super::dissertation;
 use super::error::StudyError;
 use super::laboratory::Laboratory;
 use super::point::Point;
-use super::report::{FIGURES, Figure, ReportError, figures_csv, slug};
+use super::report::{Cell, FIGURES, Figure, ReportError, figures_csv, slug};
 use super::scale::Scale;
 
 /// Scene of [`check`].
@@ -79,6 +79,16 @@ pub(super) fn write(
     Ok(())
 }
 
+/// Number of a figure; NaN for a quality that is not reached.
+fn measured_number(value: &Cell) -> Option<f64> {
+    match value {
+        Cell::Integer(value) => Some(*value as f64),
+        Cell::Real { value, .. } => Some(*value),
+        Cell::Text(text) if text == dissertation::NOT_REACHED => Some(f64::NAN),
+        Cell::Empty | Cell::Text(_) => None,
+    }
+}
+
 /// Writes the claims of the dissertation, compared with `figures`, as `dissertation.md` into `folder`.
 ///
 /// # Errors
@@ -86,7 +96,7 @@ pub(super) fn write(
 pub(super) fn write_claims(folder: &Path, figures: &[Figure]) -> Result<(), StudyError> {
     let measured = |name: &str, scene: &str| {
         let figure = figures.iter().find(|figure| figure.name == name && figure.scene == scene)?;
-        Some(dissertation::Measured { value: figure.value.number()?, interval: figure.interval })
+        Some(dissertation::Measured { value: measured_number(&figure.value)?, interval: figure.interval })
     };
     let page = dissertation::page(&measured);
     Ok(output::write(&folder.join("dissertation.md"), page.as_bytes()).map_err(ReportError::from)?)

@@ -17,7 +17,7 @@ use photoncard_shared::message::{Drain, FrameParameters, Tile};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
-use super::sample::{Chosen, Estimate, SampleRate, choose};
+use super::sample::{Chosen, Estimate, Ratio, SampleRate, choose, ratio_of_sums};
 use super::whole_frame::WholeFrame;
 
 /// Sums over a chip's reads of some structures (kinds of data) in card memory.
@@ -95,6 +95,11 @@ impl TileMeasurement {
         self.sum(|other| other == structure)
     }
 
+    /// Bytes of photon map and scene fetched from DRAM, and bytes read and written of what waits there.
+    pub(crate) fn all_bytes(&self) -> f64 {
+        (self.sum(|_| true).dram_bytes + self.waiting_written_bytes) as f64
+    }
+
     fn sum(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
         let mut sum = ReadSums::default();
         for (_, reads) in
@@ -113,6 +118,29 @@ impl Measurement {
     pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
         let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
         Estimate::of_total(&sample)
+    }
+
+    /// Ratio of the sums of two counts over all tiles of the picture.
+    pub(crate) fn ratio(
+        &self,
+        numerator: impl Fn(&TileMeasurement) -> f64,
+        denominator: impl Fn(&TileMeasurement) -> f64,
+    ) -> Ratio {
+        let both = |tile: &TileMeasurement| (numerator(tile), denominator(tile), tile.stands_for);
+        ratio_of_sums(&self.tiles.iter().map(both).collect::<Vec<_>>())
+    }
+
+    /// Ratio of the sum of `count` over all tiles of the picture to that of `other`. If both have the same
+    /// tiles, the interval is that of their residuals.
+    pub(crate) fn over(&self, other: &Self, count: impl Fn(&TileMeasurement) -> f64) -> Ratio {
+        let place = |tile: &TileMeasurement| (tile.tile, tile.stands_for);
+        if !self.tiles.iter().map(place).eq(other.tiles.iter().map(place)) {
+            return Ratio::new(self.total(&count), other.total(&count), 0.0);
+        }
+        let pairs = self.tiles.iter().zip(&other.tiles);
+        let both: Vec<_> =
+            pairs.map(|(first, second)| (count(first), count(second), first.stands_for)).collect();
+        ratio_of_sums(&both)
     }
 
     /// Number of gathers, which are searches of the photon map.
@@ -137,10 +165,7 @@ impl Measurement {
 
     /// Bytes of photon map and scene fetched from DRAM, and bytes read and written of what waits there.
     pub fn dram_bytes(&self) -> Estimate {
-        self.total(|tile| {
-            let read = tile.sum(|_| true).dram_bytes;
-            (read + tile.waiting_written_bytes) as f64
-        })
+        self.total(TileMeasurement::all_bytes)
     }
 }
 

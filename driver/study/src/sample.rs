@@ -132,7 +132,7 @@ impl Estimate {
 
 /// Ratio of two estimates, with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ratio {
+pub(crate) struct Ratio {
     pub value: f64,
     pub lower: f64,
     pub upper: f64,
@@ -151,6 +151,23 @@ impl Ratio {
         let value = numerator.value / denominator.value;
         Self { value, lower: value / spread, upper: value * spread }
     }
+}
+
+/// Ratio of the sums of two quantities of the same members. Each element has both quantities of a member and
+/// its weight. The interval is that of the residuals `n - ratio d` (Cochran 1977, *Sampling Techniques*,
+/// chapter 6), so that what varies alike in both cancels.
+pub(super) fn ratio_of_sums(sample: &[(f64, f64, usize)]) -> Ratio {
+    let sum = |of: fn(&(f64, f64, usize)) -> f64| -> f64 {
+        sample.iter().map(|member| of(member) * member.2 as f64).sum()
+    };
+    let denominator = sum(|&(_, denominator, _)| denominator);
+    let value = sum(|&(numerator, ..)| numerator) / denominator;
+    let residuals: Vec<_> = sample
+        .iter()
+        .map(|&(numerator, denominator, weight)| (numerator - value * denominator, weight))
+        .collect();
+    let half_width = Estimate::of_total(&residuals).half_width / denominator.abs();
+    Ratio { value, lower: value - half_width, upper: value + half_width }
 }
 
 /// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). Element `i` of
@@ -277,6 +294,23 @@ mod tests {
         assert!(((ratio.lower / 3.0).ln() + 1.3).abs() < 1e-12);
         let exact = Ratio::new(estimate(6.0, 0.0), estimate(2.0, 0.0), 0.0);
         assert_eq!([exact.lower, exact.upper], [3.0, 3.0]);
+    }
+
+    #[test]
+    fn what_varies_alike_cancels_in_a_ratio_of_the_same_members() {
+        let members = |noise: f64| -> Vec<_> {
+            let member = |index: u32| {
+                let size = f64::from(hash(index) % 100 + 1);
+                (3.0 * size + noise * f64::from(index % 2), size, 17)
+            };
+            (0..40).map(member).collect()
+        };
+        let proportional = ratio_of_sums(&members(0.0));
+        assert!((proportional.value - 3.0).abs() < 1e-12 && proportional.upper - proportional.lower < 1e-9);
+        let noisy = ratio_of_sums(&members(10.0));
+        assert!(noisy.lower < noisy.value && noisy.value < noisy.upper && noisy.upper < 1.1 * noisy.value);
+        let all: Vec<_> = members(10.0).into_iter().map(|(n, d, _)| (n, d, 1)).collect();
+        assert_eq!(ratio_of_sums(&all).lower, ratio_of_sums(&all).upper);
     }
 
     #[test]

@@ -16,7 +16,8 @@ pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0
 /// State of the card image in memory, or of a memory test.
 #[repr(u8)]
 pub(super) enum ImageState {
-    None,
+    // 0, so that a static card is zeroed memory: see `Slot`.
+    None = 0,
     Loading(Loader),
     /// All lines have been received; their checksum is being computed.
     Checking(Check),

@@ -37,6 +37,7 @@ pub enum Event {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 enum Passage {
+    // Zero, as are the first states of `Control` and `End`: a static card is zeroed memory.
     /// The message has arrived at the other end, but is not taken there.
     Held = 0,
     /// The message is to be sent; `again` is true if it was sent before.
@@ -62,6 +63,7 @@ struct Incoming {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Control {
+    // Not 0, which is that of no control frame, as in `Passage`.
     Acknowledge = 1,
     Probe,
     Answer,

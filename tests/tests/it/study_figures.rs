@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use photoncard_driver::render::PROGRAM;
-use photoncard_driver::study::dissertation::{self, Measured};
+use photoncard_driver::study::dissertation::{self, Measured, NOT_REACHED};
 use photoncard_driver::study::{Figure, Laboratory, StudyObserver, check, human};
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde::Deserialize;
@@ -108,11 +108,12 @@ fn the_claims_of_the_dissertation_are_compared_with_the_figures_of_the_csv() {
     let figures = figures(&read("studies.csv"));
     let measured = |name: &str, scene: &str| {
         let Line { value, lower, upper, .. } = figures.get(&(name.to_owned(), scene.to_owned()))?;
-        Some(Measured {
-            value: value.parse().ok()?,
-            interval: lower.zip(*upper).map(|(lower, upper)| [lower, upper]),
-        })
+        let value = if value == NOT_REACHED { f64::NAN } else { value.parse().ok()? };
+        Some(Measured { value, interval: lower.zip(*upper).map(|(lower, upper)| [lower, upper]) })
     };
+    for file in dissertation::files() {
+        assert!(documents().join("..").join(file).is_file(), "{file}");
+    }
     let expected = dissertation::page(&measured);
     if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(documents().join("dissertation.md"), &expected).expect("written");

@@ -2,10 +2,13 @@
 
 use super::super::report::human;
 
+/// Value of a figure of a quality that a technique does not reach.
+pub const NOT_REACHED: &str = "not reached";
+
 /// Value of a key figure, with the ends of its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Value in the figure's unit.
+    /// Value in the figure's unit; NaN for [`NOT_REACHED`].
     pub value: f64,
     /// Ends of the interval; `None` for a figure without one.
     pub interval: Option<[f64; 2]>,
@@ -24,13 +27,21 @@ pub(super) struct Claim {
 /// Evidence for a claim.
 pub(super) enum Evidence {
     /// Measured figures that must satisfy a condition. `otherwise` says why one does not.
-    Measured { figures: &'static [FigureOf], holds: Condition, otherwise: &'static str },
+    Measured { figures: &'static [FigureOf], scope: Scope, holds: Condition, otherwise: &'static str },
     /// Figures of a model, for which no hardware exists.
     Modelled { figures: &'static [FigureOf], model: &'static str },
-    /// An input or a property of the design, which the named test or option shows.
-    Built(&'static str),
+    /// An input or a property of the design, which the named file shows.
+    Built { shown: &'static str, file: &'static str },
     /// Reason why nothing was measured.
     None(&'static str),
+}
+
+/// Figures that must meet a condition.
+#[derive(Clone, Copy)]
+pub(super) enum Scope {
+    All,
+    /// The one with the best verdict.
+    Best,
 }
 
 /// A key figure.
@@ -62,6 +73,7 @@ enum Verdict {
 }
 
 impl Condition {
+    /// Verdict on a figure. One that is not reached meets no condition.
     fn verdict(self, measured: Measured) -> Verdict {
         let [lower, upper] = measured.interval.unwrap_or([measured.value; 2]);
         let holds = match self {
@@ -92,6 +104,9 @@ impl Condition {
 
 impl FigureOf {
     fn text(&self, measured: Measured) -> String {
+        if measured.value.is_nan() {
+            return format!("{} {NOT_REACHED}", self.label).trim_start().to_owned();
+        }
         let number = |value: f64| human(value * self.factor, 3);
         let interval = match measured.interval {
             Some([lower, upper]) if lower < upper => format!(" ({} to {})", number(lower), number(upper)),
@@ -129,7 +144,7 @@ impl Evidence {
                 none if none.is_empty() => (*model).to_owned(),
                 some => format!("{some}: {model}"),
             },
-            Self::Built(shown) => (*shown).to_owned(),
+            Self::Built { shown, file } => format!("{shown} (`{file}`)"),
             Self::None(_) => String::new(),
         }
     }
@@ -137,18 +152,23 @@ impl Evidence {
     /// Verdict, as text.
     pub(super) fn verdict(&self, figures: Figures) -> String {
         match self {
-            Self::Measured { figures: of, holds, otherwise } => {
-                let verdicts: Vec<_> = of
+            Self::Measured { figures: of, scope, holds, otherwise } => {
+                let verdict = |figure: &FigureOf| {
+                    let verdict = figures(figure.name, figure.scene).map(|value| holds.verdict(value));
+                    (figure.label, verdict)
+                };
+                let verdicts: Vec<_> = of.iter().map(verdict).collect();
+                let best = verdicts
                     .iter()
-                    .map(|figure| {
-                        let verdict = figures(figure.name, figure.scene).map(|value| holds.verdict(value));
-                        (figure.label, verdict)
-                    })
-                    .collect();
-                summary(&verdicts, otherwise)
+                    .filter(|(_, verdict)| verdict.is_some())
+                    .min_by_key(|(_, verdict)| *verdict);
+                match (scope, best) {
+                    (Scope::Best, Some(best)) => summary(&[*best], otherwise),
+                    _ => summary(&verdicts, otherwise),
+                }
             }
             Self::Modelled { .. } => "*modelled only*".to_owned(),
-            Self::Built(_) => "*reproduced*".to_owned(),
+            Self::Built { .. } => "*reproduced*, as built".to_owned(),
             Self::None(reason) => format!("*not covered*: {reason}"),
         }
     }
@@ -218,6 +238,7 @@ mod tests {
     fn a_claim_states_its_figures_with_interval_unit_and_condition() {
         let evidence = Evidence::Measured {
             figures: &[IN_MEGABYTES],
+            scope: Scope::All,
             holds: Condition::AtMost(0.5),
             otherwise: "it is so",
         };

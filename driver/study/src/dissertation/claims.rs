@@ -1,7 +1,7 @@
 //! List of the claims.
 
 use super::claim::Condition::{AtLeast, AtMost, Between};
-use super::claim::{Claim, Evidence, FigureOf};
+use super::claim::{Claim, Condition, Evidence, FigureOf, Scope};
 
 const CORNELL: &str = "cornell";
 const GLOSSY: &str = "cornell-glossy";
@@ -16,6 +16,15 @@ const fn figure(
     FigureOf { label, name, scene, factor: 1.0, unit }
 }
 
+const fn percent(
+    label: &'static str,
+    name: &'static str,
+    scene: &'static str,
+    unit: &'static str,
+) -> FigureOf {
+    FigureOf { label, name, scene, factor: 100.0, unit }
+}
+
 /// A figure of all three scenes.
 const fn in_scenes(name: &'static str, unit: &'static str) -> [FigureOf; 3] {
     [
@@ -25,43 +34,50 @@ const fn in_scenes(name: &'static str, unit: &'static str) -> [FigureOf; 3] {
     ]
 }
 
-const fn measured(
-    figures: &'static [FigureOf],
-    holds: super::claim::Condition,
-    otherwise: &'static str,
-) -> Evidence {
-    Evidence::Measured { figures, holds, otherwise }
+/// Evidence of all figures.
+const fn measured(figures: &'static [FigureOf], holds: Condition, otherwise: &'static str) -> Evidence {
+    Evidence::Measured { figures, scope: Scope::All, holds, otherwise }
+}
+
+/// Evidence of the figure that meets the condition best.
+const fn best(figures: &'static [FigureOf], holds: Condition, otherwise: &'static str) -> Evidence {
+    Evidence::Measured { figures, scope: Scope::Best, holds, otherwise }
+}
+
+/// A property of the design, which a file shows.
+const fn built(shown: &'static str, file: &'static str) -> Evidence {
+    Evidence::Built { shown, file }
 }
 
 pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         place: "GI",
-        claim: "a frame of 512x512 pixels of a simple scene requests of the kd-tree, naively",
-        published: "over 196 GB, 7.5 KB for each of 26.2 million gathers",
+        claim: "a frame of 512x512 pixels of a simple scene requests of the kd-tree, naively, for each gather",
+        published: "over 196 GB; 7.5 KB, if all of 26.2 million rays gather",
         evidence: measured(
             &[FigureOf {
                 label: "",
                 name: "reordering.raw-bytes-of-a-gather.naive",
                 scene: CORNELL,
                 factor: 1e-3,
-                unit: "KB a gather",
+                unit: "KB",
             }],
-            Between(5600.0, 9400.0),
-            "the search and its tree differ",
+            AtLeast(5600.0),
+            "photons of 20 bytes and nodes are read by fewer requests",
         ),
     },
     Claim {
         place: "GI",
-        claim: "two practical reorderings, with about 1 MB of storage, fetch",
+        claim: "the two practical reorderings, with about 1 MB of storage, fetch",
         published: "about 24 GB",
         evidence: measured(
             &[
                 figure("dirbin", "reordering.gigabytes.dirbin", CORNELL, "GB"),
                 figure("hash", "reordering.gigabytes.hash", CORNELL, "GB"),
-                figure("sort", "reordering.gigabytes.sort", CORNELL, "GB"),
+                figure("hash, cache of 32 ways", "reordering.gigabytes.hash-32-ways-hashed", CORNELL, "GB"),
             ],
-            AtMost(30.0),
-            "bins of directions alone leave too few photons in common; the number of bins there is not known",
+            Between(18.0, 30.0),
+            "number of bins and associativity are not known there: with 4 ways, conflicts add to the bytes of hash, and bins of directions alone leave gathers far apart",
         ),
     },
     Claim {
@@ -85,7 +101,7 @@ pub(super) const CLAIMS: &[Claim] = &[
                     unit: "MB",
                 },
             ],
-            AtMost(0.019),
+            AtMost(0.0188),
             "neighbouring photons of Jensen's array lie in different lines, so that each gather reads lines of its own",
         ),
     },
@@ -93,18 +109,16 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "GI, TVCG",
         claim: "the picture is the same in every order",
         published: "exactly",
-        evidence: Evidence::Built(
-            "byte for byte, with any tiles, chips and links (`tests/tests/it/exactness.rs`)",
-        ),
+        evidence: built("byte for byte, with any tiles, chips and links", "tests/tests/it/exactness.rs"),
     },
     Claim {
         place: "GI, TVCG",
-        claim: "a data structure alone does not give the reduction",
+        claim: "a data structure alone does not give the reduction: naive bytes in the line layout over bytes with reordering too",
         published: "",
         evidence: measured(
-            &const { in_scenes("techniques.factor.lines", "times less than naive") },
-            AtMost(2.0),
-            "leaves that fill a line are read by fewer requests",
+            &const { in_scenes("techniques.lines-over-reordering", "times") },
+            AtLeast(4.0),
+            "the line layout alone reads nearly as little",
         ),
     },
     Claim {
@@ -112,13 +126,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         claim: "the irradiance cache saves of a diffuse scene of low complexity",
         published: "40 % or more",
         evidence: measured(
-            &[FigureOf {
-                label: "",
-                name: "techniques.saved-share.irradiance-cache",
-                scene: CORNELL,
-                factor: 100.0,
-                unit: "% of the bytes, tiled",
-            }],
+            &[percent("", "techniques.saved-share.irradiance-cache", CORNELL, "% of all bytes, tiled")],
             AtLeast(0.4),
             "tiles of 16x16 pixels share few records",
         ),
@@ -127,28 +135,38 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "chapter 5",
         claim: "the cache is made parallel: no pixel depends on the pixels before it",
         published: "",
-        evidence: Evidence::Built(
-            "records on a lattice depend on their position alone (`tests/tests/it/irradiance_cache.rs`); the dissertation's rule is not known",
+        evidence: built(
+            "records depend on their position alone, and pictures on no order of tiles; the dissertation's own rule is not known",
+            "tests/tests/it/exactness.rs",
         ),
     },
     Claim {
         place: "chapter 6, IS",
         claim: "combined importance sampling cuts the rays of equal quality",
-        published: "by up to an order of magnitude, 10 of 100",
-        evidence: measured(
+        published: "by up to an order of magnitude: 10 of 100",
+        evidence: best(
             &const { in_scenes("techniques.rays-at-equal-quality.combined-sampling", "rays") },
             AtMost(12.5),
-            "the light that gather rays meet here comes from everywhere, and a table of 4x8 cells has little to choose",
+            "the light that gather rays meet in these scenes comes from everywhere; the best scene measured is lit by one spot, with 44 rays for 200 ([techniques](techniques.md))",
         ),
     },
     Claim {
         place: "section 6.6",
-        claim: "it is compatible with reordering and irradiance caching: all techniques against reordering alone, at equal quality",
+        claim: "it is compatible with reordering and irradiance caching, and their benefits build on each other: all techniques against reordering alone, at equal quality",
         published: "fewer bytes",
         evidence: measured(
             &const { in_scenes("techniques.factor-over-exact-reordering.all-techniques", "times fewer") },
             AtLeast(1.0),
-            "the cache's survey rays and the tables cost more than they save",
+            "survey rays and tables cost more than they save",
+        ),
+    },
+    Claim {
+        place: "section 6.6",
+        claim: "sharp lobes are not well represented by a table",
+        published: "",
+        evidence: built(
+            "the lobe is sampled apart from the cells of a table",
+            "firmware/src/importance/mod.rs",
         ),
     },
     Claim {
@@ -156,105 +174,97 @@ pub(super) const CLAIMS: &[Claim] = &[
         claim: "pictures of a glossy floor, n = 1 to 128",
         published: "eight pictures",
         evidence: Evidence::None(
-            "a picture is no figure; `photoncard render scenes/cornell-glossy.gltf --set floor.exponent=N` renders each",
+            "a picture is no figure; `photoncard render scenes/cornell-glossy.gltf --camera floor --set floor.exponent=N` renders each",
         ),
     },
     Claim {
         place: "figure 6.17 a",
-        claim: "the bytes of the naive order fall as n grows from 1 to 128",
-        published: "last over first below 1",
+        claim: "bytes of the tiled order at n = 128 over those at n = 1",
+        published: "falls",
         evidence: measured(
-            &[
-                figure("whole picture", "figure-6.17.last-over-first.without-cache.naive", GLOSSY, ""),
-                figure("floor alone", "figure-6.17.last-over-first.floor-alone.naive", GLOSSY, ""),
-            ],
+            &[figure("", "figure-6.17.last-over-first.without-cache.tiled", GLOSSY, "")],
             AtMost(1.0),
-            "rays of a narrow lobe leave the open box less often than those of a wide one, so that there are more gathers",
+            "it does not fall",
         ),
     },
     Claim {
         place: "figure 6.17 a",
-        claim: "the bytes of reordered gathers do not depend on n",
-        published: "nearly flat, here greatest over least",
+        claim: "the same of reordered gathers",
+        published: "minor or no reduction: 0.9 or more",
         evidence: measured(
             &[
-                figure("dirbin", "figure-6.17.greatest-over-least.without-cache.dirbin", GLOSSY, ""),
-                figure("hash", "figure-6.17.greatest-over-least.without-cache.hash", GLOSSY, ""),
+                figure("dirbin", "figure-6.17.last-over-first.without-cache.dirbin", GLOSSY, ""),
+                figure("hash", "figure-6.17.last-over-first.without-cache.hash", GLOSSY, ""),
                 figure(
                     "dirbin, combined",
-                    "figure-6.17.greatest-over-least.without-cache.dirbin-combined",
+                    "figure-6.17.last-over-first.without-cache.dirbin-combined",
                     GLOSSY,
                     "",
                 ),
                 figure(
                     "hash, combined",
-                    "figure-6.17.greatest-over-least.without-cache.hash-combined",
+                    "figure-6.17.last-over-first.without-cache.hash-combined",
                     GLOSSY,
                     "",
                 ),
             ],
-            AtMost(1.1),
-            "bins of the hemisphere do not follow a lobe, and the number of gathers varies with n",
+            AtLeast(0.9),
+            "fewer lines of the map are read for gathers of a narrow lobe in these orders too",
         ),
     },
     Claim {
         place: "figure 6.17 b",
-        claim: "with the irradiance cache the bytes of the naive order fall too",
-        published: "last over first below 1",
+        claim: "bytes of the tiled order at n = 128 over those at n = 1",
+        published: "falls",
         evidence: measured(
-            &[figure("", "figure-6.17.last-over-first.with-cache.naive", GLOSSY, "")],
+            &[figure("", "figure-6.17.last-over-first.with-cache.tiled", GLOSSY, "")],
             AtMost(1.0),
-            "",
+            "it does not fall",
         ),
     },
     Claim {
         place: "figure 6.17 b",
-        claim: "with the irradiance cache the bytes of reordered gathers do not depend on n",
-        published: "nearly flat, here greatest over least",
+        claim: "the same of reordered gathers",
+        published: "minor or no reduction: 0.9 or more",
         evidence: measured(
             &[
-                figure("dirbin", "figure-6.17.greatest-over-least.with-cache.dirbin", GLOSSY, ""),
-                figure("hash", "figure-6.17.greatest-over-least.with-cache.hash", GLOSSY, ""),
+                figure("dirbin", "figure-6.17.last-over-first.with-cache.dirbin", GLOSSY, ""),
+                figure("hash", "figure-6.17.last-over-first.with-cache.hash", GLOSSY, ""),
                 figure(
                     "dirbin, combined",
-                    "figure-6.17.greatest-over-least.with-cache.dirbin-combined",
+                    "figure-6.17.last-over-first.with-cache.dirbin-combined",
                     GLOSSY,
                     "",
                 ),
-                figure(
-                    "hash, combined",
-                    "figure-6.17.greatest-over-least.with-cache.hash-combined",
-                    GLOSSY,
-                    "",
-                ),
+                figure("hash, combined", "figure-6.17.last-over-first.with-cache.hash-combined", GLOSSY, ""),
             ],
-            AtMost(1.1),
-            "fewer pixels of a floor with a wide lobe are interpolated than of one with a narrow lobe",
+            AtLeast(0.9),
+            "fewer lines of the map are read for gathers of a narrow lobe in these orders too",
         ),
     },
     Claim {
         place: "figure 6.17",
-        claim: "the tiled curve lies within the plot",
+        claim: "the highest value of a curve, tiled",
         published: "below 180 GB",
         evidence: measured(
-            &[figure("", "figure-6.17.mean-gigabytes.without-cache.tiled", GLOSSY, "GB")],
+            &[figure("", "figure-6.17.greatest-gigabytes.without-cache.tiled", GLOSSY, "GB")],
             AtMost(180.0),
-            "lines of 128 bytes are counted, of which Jensen's tree uses few",
+            "associativity, layout of the tree and view are not known there",
         ),
     },
     Claim {
         place: "section 6.5",
-        claim: "narrow rays save little, compared with reordering: what `hash` saves over what n saves, tiled",
+        claim: "narrow rays save little, compared with reordering: what hash saves over what n saves, tiled",
         published: "minor",
         evidence: measured(
             &[figure("", "figure-6.17.reordering-over-exponent", GLOSSY, "times")],
             AtLeast(2.0),
-            "",
+            "narrow rays save as much",
         ),
     },
     Claim {
         place: "section 7.1, goal 1",
-        claim: "expansion cards for a workstation",
+        claim: "expansion cards for a standard workstation",
         published: "",
         evidence: Evidence::None(
             "no card is built: cards are emulated, run in QEMU, or are boards on a serial port",
@@ -264,21 +274,31 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "section 7.1, goal 2",
         claim: "one design of a chip",
         published: "",
-        evidence: Evidence::Built(
-            "one firmware, whose budgets are constants of a kind of chip (`firmware::kind`)",
+        evidence: built(
+            "one firmware, whose budgets are constants of a kind of chip; nothing is synthesized",
+            "firmware/src/kind/mod.rs",
         ),
     },
     Claim {
         place: "section 7.1, goal 3",
         claim: "no communication between chips",
         published: "",
-        evidence: Evidence::Built("a card has one link, to its host ([protocol](protocol.md))"),
+        evidence: built(
+            "a card has one link, to its host ([protocol](protocol.md))",
+            "firmware/src/serve.rs",
+        ),
     },
     Claim {
         place: "section 7.1, goal 4",
         claim: "technology of 2010",
         published: "",
         evidence: Evidence::None("nothing is synthesized"),
+    },
+    Claim {
+        place: "section 7.1",
+        claim: "a simple tree of links to the host suffices",
+        published: "",
+        evidence: Evidence::None("trees exist in the cost model alone ([scaling](scaling.md#upload))"),
     },
     Claim {
         place: "section 7.1",
@@ -293,13 +313,23 @@ pub(super) const CLAIMS: &[Claim] = &[
         evidence: measured(
             &[figure("atrium, counted", "table-7.1.teraflops.naive", ATRIUM, "TFLOPS")],
             Between(5.55, 9.25),
-            "a ray meets a hierarchy of many small triangles, and C_RayCast is that of a simple scene; distances and selection are counted too",
+            "a ray meets a hierarchy of many small triangles, and C_RayCast is that of a simple scene; distances and comparisons of the search are counted too",
+        ),
+    },
+    Claim {
+        place: "section 7.1",
+        claim: "chips for that arithmetic",
+        published: "less than sixteen",
+        evidence: measured(
+            &const { in_scenes("table-7.1.chips-by-arithmetic.naive", "chips") },
+            AtMost(15.0),
+            "of the same counts",
         ),
     },
     Claim {
         place: "section 7.1",
         claim: "30 naive frames a second of Sponza read",
-        published: "11 TB/s",
+        published: "11 TB/s, twelve dozen chips of 90 GB/s",
         evidence: measured(
             &[figure("atrium", "table-7.1.terabytes.naive", ATRIUM, "TB/s")],
             Between(8.25, 13.75),
@@ -308,27 +338,57 @@ pub(super) const CLAIMS: &[Claim] = &[
     },
     Claim {
         place: "section 7.1",
-        claim: "chips for that bandwidth",
-        published: "twelve dozen",
+        claim: "memory bandwidth is the limiting factor: time of the bytes over time of the arithmetic, naive",
+        published: "above 1",
         evidence: measured(
-            &[figure("atrium", "table-7.1.chips-by-bandwidth.naive", ATRIUM, "chips")],
-            Between(108.0, 180.0),
-            "11 TB/s over 90 GB/s are 122, and the atrium here reads less",
+            &const { in_scenes("table-7.1.bandwidth-over-arithmetic.naive", "") },
+            AtLeast(1.0),
+            "arithmetic limits",
+        ),
+    },
+    Claim {
+        place: "section 7.1",
+        claim: "the same with all techniques",
+        published: "above 1",
+        evidence: measured(
+            &const { in_scenes("table-7.1.bandwidth-over-arithmetic.all-techniques", "") },
+            AtLeast(1.0),
+            "the techniques cut bytes more than arithmetic, which then limits",
         ),
     },
     Claim {
         place: "chapter 7",
-        claim: "the three techniques together cut the bandwidth, at equal quality",
+        claim: "the three techniques together cut the bandwidth, at equal quality, in Jensen's tree",
         published: "almost two orders of magnitude",
         evidence: measured(
-            &const { in_scenes("techniques.factor-at-equal-quality.all-techniques-lines", "times") },
-            AtLeast(80.0),
-            "floors and walls of a large scene share less",
+            &const { in_scenes("techniques.factor-at-equal-quality.all-techniques-jensen", "times") },
+            AtLeast(75.0),
+            "a large scene has more photons and records that differ from tile to tile",
+        ),
+    },
+    Claim {
+        place: "chapter 7",
+        claim: "they impose no significant computation: counted arithmetic with all techniques over naive, at equal rays",
+        published: "",
+        evidence: measured(
+            &const { in_scenes("table-7.1.arithmetic-over-naive", "") },
+            AtMost(1.1),
+            "more rays are cast for records than are saved",
         ),
     },
     Claim {
         place: "beyond",
-        claim: "the same with gathers that wait in card memory, whole frames, all bytes",
+        claim: "the three techniques with photons in lines, at equal quality",
+        published: "",
+        evidence: measured(
+            &const { in_scenes("techniques.factor-at-equal-quality.all-techniques-lines", "times") },
+            AtLeast(75.0),
+            "a large scene has more photons and records that differ from tile to tile",
+        ),
+    },
+    Claim {
+        place: "beyond",
+        claim: "the same with gathers that wait in card memory: whole frames, all bytes",
         published: "",
         evidence: measured(
             &const {
@@ -337,14 +397,14 @@ pub(super) const CLAIMS: &[Claim] = &[
                     "times",
                 )
             },
-            AtLeast(100.0),
-            "",
+            AtLeast(75.0),
+            "the scene is most of what is read",
         ),
     },
     Claim {
         place: "section 7.1",
-        claim: "a desktop machine renders 30 frames a second: chips with all techniques, by counted arithmetic and bandwidth",
-        published: "less than 16",
+        claim: "a desktop machine renders difficult indirect light at 30 frames a second: chips with all techniques, by bandwidth and counted arithmetic",
+        published: "a small number of cards",
         evidence: Evidence::Modelled {
             figures: &const { in_scenes("table-7.1.chips-by-count.all-techniques", "chips") },
             model: "units never wait for each other",
@@ -352,12 +412,12 @@ pub(super) const CLAIMS: &[Claim] = &[
     },
     Claim {
         place: "section 7.1",
-        claim: "memory bandwidth is the limiting factor: chips by bandwidth alone, with all techniques",
+        claim: "internal storage is within the technology's",
         published: "",
-        evidence: Evidence::Modelled {
-            figures: &const { in_scenes("table-7.1.chips-by-bandwidth.all-techniques", "chips") },
-            model: "with the techniques, arithmetic limits",
-        },
+        evidence: built(
+            "all buffers of the reference chip take 1 MB, by an assertion of the build",
+            "firmware/src/card/mod.rs",
+        ),
     },
     Claim {
         place: "section 7.1",
@@ -366,17 +426,12 @@ pub(super) const CLAIMS: &[Claim] = &[
         evidence: Evidence::None("there is no description in registers and gates"),
     },
     Claim {
-        place: "section 7.1",
-        claim: "a tree of links to the host suffices",
+        place: "chapter 7",
+        claim: "a functional simulation verifies the pictures, under a variety of conditions",
         published: "",
-        evidence: Evidence::None("trees exist in the cost model alone ([scaling](scaling.md#upload))"),
-    },
-    Claim {
-        place: "section 7.1, chapter 7",
-        claim: "a functional simulation verifies the pictures",
-        published: "",
-        evidence: Evidence::Built(
-            "the firmware runs in the host's process, and pictures are compared with path-traced references (`tests/tests/it/references.rs`)",
+        evidence: built(
+            "the firmware runs in the host's process, and pictures are compared with path-traced references",
+            "tests/tests/it/references.rs",
         ),
     },
     Claim {
@@ -392,8 +447,9 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "chapter 7",
         claim: "no deadlock",
         published: "",
-        evidence: Evidence::Built(
-            "an argument ([scaling](scaling.md)), and simulated machines with losses (`driver/tests/it/simulation`)",
+        evidence: built(
+            "no run of simulated machines with losses blocked; why none can is argued in [scaling](scaling.md)",
+            "driver/tests/it/simulation/mod.rs",
         ),
     },
 ];
@@ -403,15 +459,16 @@ pub(super) const SYMBOLS: &[Claim] = &[
         place: "P",
         claim: "pixels of a tile",
         published: "16x16",
-        evidence: Evidence::Built(
+        evidence: built(
             "`--tile`: 16x16 where studies say nothing else, up to 64x64 on the reference chip",
+            "driver/study/src/scale.rs",
         ),
     },
     Claim {
         place: "T",
         claim: "tiles of a picture of 512x512 pixels",
         published: "1024",
-        evidence: Evidence::Built("follows from P"),
+        evidence: built("follows from P", "driver/study/src/scale.rs"),
     },
     Claim {
         place: "F",
@@ -423,49 +480,53 @@ pub(super) const SYMBOLS: &[Claim] = &[
         place: "N_FG",
         claim: "final gather rays",
         published: "33, **100**, 200",
-        evidence: Evidence::Built("`--gather-rays`: 100 in studies"),
+        evidence: built("`--gather-rays`: 100 in studies", "driver/study/src/scale.rs"),
     },
     Claim {
         place: "k",
         claim: "photons that a gather searches for",
         published: "100",
-        evidence: Evidence::Built("`--neighbors`: 100 in studies"),
+        evidence: built("`--neighbors`: 100 in studies", "driver/study/src/scale.rs"),
     },
     Claim {
         place: "N_S",
         claim: "shadow rays",
         published: "8",
-        evidence: Evidence::Built("`--shadow-rays`: 8 in studies"),
+        evidence: built("`--shadow-rays`: 8 in studies", "driver/study/src/scale.rs"),
     },
     Claim {
         place: "C_J",
         claim: "importance sampling bins",
         published: "4x8",
-        evidence: Evidence::Built(
-            "the cells of a direction table, with one more for the lobe (`firmware::importance`)",
+        evidence: built(
+            "the cells of a direction table, with one more for the lobe",
+            "firmware/src/importance/mod.rs",
         ),
     },
     Claim {
         place: "N_PM",
         claim: "photons of the indirect map",
         published: "0.5 to 6 million",
-        evidence: Evidence::Built("`--photons`: 500,000 in studies; 2 and 6 million in `scaling`"),
+        evidence: built(
+            "`--photons`: 500,000 in studies; 2 and 6 million in `scaling`",
+            "driver/study/src/scale.rs",
+        ),
     },
     Claim {
         place: "R_IC",
-        claim: "share of pixels that use the irradiance cache",
+        claim: "share of pixels that use the irradiance cache, with the error 0.025",
         published: "0, **60**, 95 %",
         evidence: measured(
             &const {
                 let name = "table-7.1.interpolated-share.all-techniques";
                 [
-                    FigureOf { label: "Cornell", name, scene: CORNELL, factor: 100.0, unit: "%" },
-                    FigureOf { label: "glossy", name, scene: GLOSSY, factor: 100.0, unit: "%" },
-                    FigureOf { label: "atrium", name, scene: ATRIUM, factor: 100.0, unit: "%" },
+                    percent("Cornell", name, CORNELL, "%"),
+                    percent("glossy", name, GLOSSY, "%"),
+                    percent("atrium", name, ATRIUM, "%"),
                 ]
             },
-            Between(0.0, 0.95),
-            "records are gathered at corners of cells, and nearly every pixel of a diffuse surface interpolates",
+            Between(0.45, 0.75),
+            "small surfaces and narrow gaps, whose pixels gather on their own, differ from scene to scene",
         ),
     },
     Claim {
@@ -481,13 +542,17 @@ pub(super) const SYMBOLS: &[Claim] = &[
         place: "L_IC",
         claim: "records interpolated for a pixel",
         published: "4",
-        evidence: Evidence::Built("the corners of a cell (`firmware::irradiance_cache`)"),
+        evidence: built("the corners of a cell", "firmware/src/irradiance_cache/interpolation.rs"),
     },
     Claim {
         place: "C_B1, C_B2",
-        claim: "evaluation of the reflection: once, and of each photon",
-        published: "12 and 10 FLOPs",
-        evidence: Evidence::Modelled { figures: &[], model: "within the counted FLOPs of a gather (C_G)" },
+        claim: "evaluation of the reflection, once and of each photon, of a gather in three channels: 3 (C_B1 + k C_B2)",
+        published: "12 and 10 FLOPs; 3,036",
+        evidence: measured(
+            &const { in_scenes("table-7.1.flops-of-reflection.naive", "FLOPs") },
+            Between(2277.0, 3795.0),
+            "most photons lie on surfaces without a lobe, whose sum is in fixed point and is multiplied once",
+        ),
     },
     Claim {
         place: "C_RayCast",
@@ -501,21 +566,31 @@ pub(super) const SYMBOLS: &[Claim] = &[
     },
     Claim {
         place: "C_G",
-        claim: "a gather with the reflection of its photons, C_G + 3 (C_B1 + k C_B2)",
-        published: "2389 + 3036 = 5425 FLOPs",
+        claim: "a naive gather with the reflection of its photons, C_G + 3 k (C_B1 + C_B2)",
+        published: "2,389 FLOPs; 8,989",
         evidence: measured(
             &const { in_scenes("table-7.1.flops-of-a-gather.naive", "FLOPs") },
+            Between(6742.0, 11236.0),
+            "search and selection take more comparisons",
+        ),
+    },
+    Claim {
+        place: "C_G",
+        claim: "a gather of all techniques, C_G + 3 (C_B1 + k C_B2)",
+        published: "2,389 FLOPs; 5,425",
+        evidence: measured(
+            &const { in_scenes("table-7.1.flops-of-a-gather.all-techniques", "FLOPs") },
             Between(4069.0, 6781.0),
-            "each photon of a tested leaf has a distance, and microfacets take more operations than a Phong lobe",
+            "search and selection take more comparisons",
         ),
     },
     Claim {
         place: "S_B",
-        claim: "a partially evaluated BRDF that waits",
+        claim: "a partially evaluated BRDF",
         published: "13 bytes",
-        evidence: Evidence::Modelled {
-            figures: &[],
-            model: "a gather with its position and all that it needs takes 24 bytes in the queue, a Lambertian one 15 in card memory ([memory](memory.md))",
-        },
+        evidence: built(
+            "13 bytes; with position and target 24 in the queue",
+            "firmware/src/scene/reflection/record.rs",
+        ),
     },
 ];

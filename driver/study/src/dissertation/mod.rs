@@ -3,7 +3,8 @@
 mod claim;
 mod claims;
 
-pub use self::claim::Measured;
+use self::claim::Evidence;
+pub use self::claim::{Measured, NOT_REACHED};
 use self::claims::{CLAIMS, SYMBOLS};
 
 const HEAD: &str = "\
@@ -13,19 +14,30 @@ For those who know Joshua Steinhurst's *Practical Photon Mapping in Hardware* (U
 `photoncard study all --out DIR` writes this page, `DIR/dissertation.md`, from the key figures of its studies (`figures.csv`). The figures here are those of
 [`studies.csv`](studies.csv); [studies.md](studies.md) says how they are measured. A test compares both.
 
-The claims are those of public excerpts (end of chapter 6, sections 7.1 and Table 7.1), and of the abstracts of the papers on reordering (*GI*: Graphics
-Interface 2005; *TVCG* 2008) and on importance sampling (*IS* 2006). Other parts of the dissertation were not at hand.
+The claims are those of public excerpts (end of chapter 6, section 7.1 with Table 7.1), of other quotations, and of the abstracts of the papers on reordering
+(*GI*: Graphics Interface 2005; *TVCG* 2008) and on importance sampling (*IS* 2006). The rest of the dissertation was not at hand. Rows *beyond* are of
+techniques that it does not have.
 
-- *reproduced*: the whole 95 % confidence interval of the figure here meets the condition in brackets. For inputs and properties of the design, a test or an
-  option shows it.
-- *contradicted, because*: no value of the interval meets it.
+- *reproduced*: the figure here, with its whole 95 % confidence interval, meets the condition in brackets. *as built*: the named file shows an input or a
+  property of the design.
+- *contradicted, because*: neither the figure nor any value of its interval meets it.
 - *open*: the interval contains values of both kinds.
 - *modelled only*: a model says so, and no hardware was measured.
 - *not covered*: nothing here says anything about it.
 
-A condition is the published value, with 25 % to either side where a value is given and no bound. Pictures, scenes and caches are not the dissertation's:
-its Sponza atrium, modified Cornell box and associativity are not known. GB are bytes of the photon map from DRAM in a frame, unless said otherwise.
+A condition is the published value, with 25 % to either side where a value is given and no bound. Intervals are of sampled tiles, and at equal quality of the
+tiles that are compared. Figures without an interval are of whole frames, or of the maximum of a curve. Pictures, scenes and caches are not the dissertation's:
+its Sponza atrium, modified Cornell box and associativity are not known. GB of rows *GI* and of figure 6.17 are bytes of the photon map from DRAM in a frame;
+all others have the scene, and what waits in card memory, too.
 ";
+
+/// Paths of the files that the page names as evidence, from the project's root.
+pub fn files() -> impl Iterator<Item = &'static str> {
+    CLAIMS.iter().chain(SYMBOLS).filter_map(|claim| match claim.evidence {
+        Evidence::Built { file, .. } => Some(file),
+        _ => None,
+    })
+}
 
 /// Page in Markdown with a row for each claim and for each symbol of Table 7.1. `figures` returns a key
 /// figure by its name and scene.
@@ -47,7 +59,6 @@ pub fn page(figures: &dyn Fn(&str, &str) -> Option<Measured>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::claim::Evidence;
     use super::*;
 
     /// Each claim has a row of five cells, whatever is measured.
@@ -83,6 +94,14 @@ mod tests {
         ] {
             assert!(rows.contains(&symbol), "{symbol}");
         }
-        assert!(CLAIMS.iter().all(|claim| !matches!(claim.evidence, Evidence::None(""))));
+        for claim in CLAIMS.iter().chain(SYMBOLS) {
+            let reason = match &claim.evidence {
+                Evidence::Measured { otherwise, .. } => otherwise,
+                Evidence::Modelled { model, .. } => model,
+                Evidence::Built { shown, .. } => shown,
+                Evidence::None(reason) => reason,
+            };
+            assert!(!reason.is_empty(), "{}: {}", claim.place, claim.claim);
+        }
     }
 }

@@ -65,15 +65,6 @@ impl Cell {
         Self::Real { value, half_width: Some(half_width) }
     }
 
-    /// Number in the cell; `None` for a text or no value.
-    pub(crate) fn number(&self) -> Option<f64> {
-        match *self {
-            Self::Integer(value) => Some(value as f64),
-            Self::Real { value, .. } => Some(value),
-            Self::Empty | Self::Text(_) => None,
-        }
-    }
-
     fn half_width(&self) -> Option<f64> {
         match self {
             Self::Real { half_width, .. } => *half_width,

@@ -3,9 +3,9 @@
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonMapSize;
-use photoncard_render::cost_model::arithmetic::{Arithmetic, ChipPart};
+use photoncard_render::cost_model::arithmetic::{Arithmetic, ChipPart, Unit};
 use photoncard_render::cost_model::{
-    ChipsNeeded, Cost, Machine, Origin, Prediction, Resource, Symbols, Workload,
+    ChipsNeeded, Cost, Machine, Origin, Prediction, Resource, Symbols, UnitCost, Workload,
 };
 
 use super::super::laboratory::Results;
@@ -13,6 +13,7 @@ use super::super::load_balance::Balance;
 use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Column, Figure, Report, Table, XScale, YScale};
+use super::super::sample::Ratio;
 use super::super::scale::Scale;
 use super::super::symbol_axes::SymbolAxes;
 use super::arithmetic::{self, CountedFrame};
@@ -25,7 +26,7 @@ use super::workload::{self, cost, of_frame, tile_seconds};
 /// Maximum number of chips in the plots.
 const MAX_CHIPS: usize = 1024;
 
-/// Number of chips whose load balance is a key figure: "less than sixteen chips" (section 7.1).
+/// Number of chips whose load balance is a key figure.
 const BALANCED_CHIPS: usize = 16;
 
 /// A frame of the cost model.
@@ -84,7 +85,8 @@ impl Errors {
         let rays = measured.total(|TileMeasurement { counters, .. }| {
             (counters.eye_rays + counters.shadow_rays + counters.gather_rays + counters.survey_rays) as f64
         });
-        // All costs are linear in a tile's counts, so that a frame's cost is the sum of its tiles'.
+        // But for importance tables, whose frames are measured whole, costs are linear in a tile's counts: a
+        // frame's cost is the sum of its tiles'.
         let bytes = measured.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64);
         let table_flops =
             measured.total(|tile| cost(&workload::of_tile(tile, symbols), symbols, order).total().flops);
@@ -110,7 +112,7 @@ impl Frame {
     }
 
     fn nominal_prediction_at(&self, side: Side) -> Prediction {
-        self.prediction_of(self.cost, self.errors.table_flops, side)
+        self.prediction_of(&self.cost, self.errors.table_flops, side)
     }
 
     /// Prediction by counted arithmetic. Frames of Table 7.1 have no counts; they are predicted by the
@@ -121,15 +123,20 @@ impl Frame {
 
     fn prediction_at(&self, side: Side) -> Prediction {
         match &self.counted {
-            Some((_, cost)) => self.prediction_of(*cost, self.errors.counted_flops, side),
+            Some((_, cost)) => self.prediction_of(cost, self.errors.counted_flops, side),
             None => self.nominal_prediction_at(side),
         }
     }
 
-    fn prediction_of(&self, mut cost: Cost, flops_error: f64, side: Side) -> Prediction {
-        let sign = side as i8;
-        cost.gather_unit.dram_bytes += f64::from(sign) * self.errors.bytes;
-        cost.gather_unit.flops += f64::from(sign) * flops_error;
+    /// Prediction for a cost, which is taken as that of one unit: a prediction depends on the total alone.
+    fn prediction_of(&self, cost: &Cost, flops_error: f64, side: Side) -> Prediction {
+        let total = cost.total();
+        let at = |value: f64, error: f64| (value + f64::from(side as i8) * error).max(0.0);
+        let total = UnitCost {
+            flops: at(total.flops, flops_error),
+            dram_bytes: at(total.dram_bytes, self.errors.bytes),
+        };
+        let cost = Cost { gather_unit: total, ..Cost::default() };
         Prediction::new(&self.workload, &cost, &self.machine)
     }
 
@@ -270,24 +277,37 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
 /// Key figures of each scene, naive and with all techniques: chips for 30 frames/s, demand, and measured
 /// symbols of the table; and how well the tiles of the last divide among chips.
 fn figures(scale: &Scale, results: &Results, frames: &[Frame]) -> Vec<Figure> {
-    let kinds = SCENES.iter().flat_map(|(scene, _)| ["naive", "all-techniques"].map(|kind| (*scene, kind)));
-    let measured = frames.iter().filter(|frame| frame.counted.is_some());
-    let of = |((scene, kind), frame): ((&str, &str), &Frame)| {
-        let mut figures = chips_figures(scene, kind, frame);
-        figures.extend(demand_figures(scene, kind, frame));
-        figures
-    };
-    let speedups = SCENES.iter().filter_map(|(scene, _)| {
+    let mut figures = Vec::new();
+    let mut frames = frames.iter().filter(|frame| frame.counted.is_some());
+    for (scene, _) in SCENES {
+        let points = [("naive", naive(scale, scene)), ("all-techniques", all_on(scale, scene))];
+        for ((kind, point), frame) in points.iter().zip(&mut frames) {
+            let measured = results.traffic(point);
+            let symbols = workload::symbols_of(&point.settings, measured);
+            figures.extend(chips_figures(scene, kind, frame));
+            figures.extend(demand_figures(scene, kind, frame));
+            figures.extend(symbol_figures(scene, kind, measured, &symbols, &scale.machine));
+        }
+        let [naive, all] = points.map(|(_, point)| {
+            let measured = results.traffic(&point);
+            let symbols = workload::symbols_of(&point.settings, measured);
+            measured.total(|tile| workload::counted(tile, &symbols).total().flops)
+        });
+        let share = Ratio::new(all, naive, 0.0);
+        figures.push(ratio_figure("table-7.1.arithmetic-over-naive", scene, share, ""));
         let seconds = tile_seconds(results.traffic(&dealt(scale, scene)), &symbols(scale), &scale.machine);
-        let speedup = deal(&seconds, BALANCED_CHIPS, CREDITS[0])?.speedup();
-        Some(Figure::new(
-            format!("table-7.1.speed-up-of-{BALANCED_CHIPS}-chips"),
-            key(scene),
-            speedup,
-            "times",
-        ))
-    });
-    kinds.zip(measured).flat_map(of).chain(speedups).collect()
+        let balance = deal(&seconds, BALANCED_CHIPS, CREDITS[0]);
+        let name = format!("table-7.1.speed-up-of-{BALANCED_CHIPS}-chips");
+        figures.extend(balance.map(|balance| Figure::new(name, key(scene), balance.speedup(), "times")));
+    }
+    figures
+}
+
+/// Figure with the interval of a ratio, if it has one.
+fn ratio_figure(name: impl Into<String>, scene: &str, ratio: Ratio, unit: &'static str) -> Figure {
+    let Ratio { value, lower, upper } = ratio;
+    let figure = Figure::new(name, key(scene), value, unit);
+    if lower < upper { figure.within(lower, upper) } else { figure }
 }
 
 fn chips_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
@@ -295,6 +315,7 @@ fn chips_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
     let nominal = predicted(|side| frame.nominal_prediction_at(side).chips_needed(30.0));
     [
         ("by-bandwidth", counted.map(|needed| Some(needed.bandwidth))),
+        ("by-arithmetic", counted.map(|needed| Some(needed.computation))),
         ("by-table", nominal.map(|needed| needed.overall)),
         ("by-count", counted.map(|needed| needed.overall)),
     ]
@@ -302,7 +323,7 @@ fn chips_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
     .map(|(by, [lower, chips, upper])| {
         let figure = Figure::new(format!("table-7.1.chips-{by}.{kind}"), key(scene), chips, "chips");
         match (lower, upper) {
-            (Some(lower), Some(upper)) => figure.within(lower as f64, upper as f64),
+            (Some(lower), Some(upper)) if lower < upper => figure.within(lower as f64, upper as f64),
             _ => figure,
         }
     })
@@ -311,25 +332,61 @@ fn chips_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
 
 fn demand_figures(scene: &str, kind: &str, frame: &Frame) -> Vec<Figure> {
     let Frame { workload, errors, .. } = frame;
-    let Some(CountedFrame { arithmetic, .. }) = frame.counted() else { return Vec::new() };
-    let counted = |part| arithmetic.sum(|unit| unit.part() == part).flops();
-    let flops = arithmetic.sum(|_| true).flops();
-    // Of means over rays and gathers, the counts in numerator and denominator vary together.
+    let flops = frame.counted.as_ref().map_or(0.0, |(_, cost)| cost.total().flops);
     [
-        ("teraflops", 30.0 * flops / 1e12, 30.0 * errors.counted_flops / 1e12, "TFLOPS"),
-        ("terabytes", 30.0 * frame.cost.total().dram_bytes / 1e12, 30.0 * errors.bytes / 1e12, "TB/s"),
-        ("million-rays", 30.0 * workload.rays() / 1e6, 30.0 * errors.rays / 1e6, "million/s"),
-        ("flops-of-a-ray", counted(ChipPart::RayCaster) / workload.rays(), 0.0, "FLOPs"),
-        ("flops-of-a-gather", counted(ChipPart::GatherUnit) / workload.gathers(), 0.0, "FLOPs"),
-        ("bytes-of-a-gather", workload.photon_map_bytes / workload.gathers(), 0.0, "bytes"),
-        ("interpolated-share", workload.interpolated_samples / workload.eye_rays, 0.0, ""),
+        ("teraflops", flops / 1e12, errors.counted_flops / 1e12, "TFLOPS"),
+        ("terabytes", frame.cost.total().dram_bytes / 1e12, errors.bytes / 1e12, "TB/s"),
+        ("million-rays", workload.rays() / 1e6, errors.rays / 1e6, "million/s"),
+    ]
+    .map(|(quantity, of_frame, error, unit)| {
+        let [value, error] = [of_frame, error].map(|value| 30.0 * value);
+        let ratio = Ratio { value, lower: value - error, upper: value + error };
+        ratio_figure(format!("table-7.1.{quantity}.{kind}"), scene, ratio, unit)
+    })
+    .into()
+}
+
+/// Symbols of the table as measured: means over rays, gathers and pixels.
+fn symbol_figures(
+    scene: &str,
+    kind: &str,
+    measured: &Measurement,
+    symbols: &Symbols,
+    machine: &Machine,
+) -> Vec<Figure> {
+    let flops = |tile: &TileMeasurement, of: &dyn Fn(Unit) -> bool| {
+        workload::arithmetic(tile, symbols).sum(of).flops()
+    };
+    let rays = |tile: &TileMeasurement| workload::of_tile(tile, symbols).rays();
+    let gathers = |tile: &TileMeasurement| tile.counters.gathers as f64;
+    let seconds_of_bytes = |tile: &TileMeasurement| tile.all_bytes() / machine.bandwidth;
+    let seconds_of_flops = |tile: &TileMeasurement| flops(tile, &|_| true) / machine.flops;
+    let of_part = |part| move |unit: Unit| unit.part() == part;
+    [
+        ("flops-of-a-ray", measured.ratio(|tile| flops(tile, &of_part(ChipPart::RayCaster)), rays), "FLOPs"),
+        (
+            "flops-of-a-gather",
+            measured.ratio(|tile| flops(tile, &of_part(ChipPart::GatherUnit)), gathers),
+            "FLOPs",
+        ),
+        (
+            "flops-of-reflection",
+            measured.ratio(|tile| flops(tile, &|unit| unit == Unit::Reflection), gathers),
+            "FLOPs",
+        ),
+        ("bytes-of-a-gather", measured.ratio(|tile| tile.photon_map().dram_bytes as f64, gathers), "bytes"),
+        (
+            "interpolated-share",
+            measured.ratio(
+                |tile| tile.counters.interpolated_samples as f64,
+                |tile| tile.counters.eye_rays as f64,
+            ),
+            "",
+        ),
+        ("bandwidth-over-arithmetic", measured.ratio(seconds_of_bytes, seconds_of_flops), ""),
     ]
     .into_iter()
-    .filter(|(_, value, ..)| value.is_finite())
-    .map(|(quantity, value, half_width, unit)| {
-        let figure = Figure::new(format!("table-7.1.{quantity}.{kind}"), key(scene), value, unit);
-        if half_width > 0.0 { figure.within(value - half_width, value + half_width) } else { figure }
-    })
+    .map(|(quantity, ratio, unit)| ratio_figure(format!("table-7.1.{quantity}.{kind}"), scene, ratio, unit))
     .collect()
 }
 

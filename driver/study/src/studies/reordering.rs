@@ -7,10 +7,10 @@ use photoncard_picture::choice::Choice;
 use photoncard_render::emulator::memory_model::{CacheSettings, CacheSpec};
 
 use super::super::laboratory::Results;
-use super::super::measure::Measurement;
+use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::{ALONG_CURVE, Point};
 use super::super::report::{Block, Cell, Column, Figure, Report, Series, Table, XScale, YScale};
-use super::super::sample::Estimate;
+use super::super::sample::{Estimate, Ratio};
 use super::super::scale::{Scale, TILE};
 use super::overlap;
 use super::present::{
@@ -151,12 +151,16 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
         section("Size of the photon cache", by_size(scale, results)),
         section("Associativity and index", by_associativity(scale, results)),
     ];
-    let figures = figures(&nominal);
+    let figures = figures(scale, results, &nominal);
     Report { figures, ..page("Reordering photon gathers", introduction, sections) }
 }
 
 /// Key figures: bytes of the photon map by the order of gathers, in Jensen's layout with the chip's caches.
-fn figures<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Vec<Figure> {
+fn figures<'a>(
+    scale: &Scale,
+    results: &Results,
+    nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement,
+) -> Vec<Figure> {
     let figure = |quantity: &str, order, bytes: Estimate| {
         let Estimate { value, half_width } = bytes.scaled(1.0 / GIGA);
         let name = format!("reordering.{quantity}.{}", name(order));
@@ -166,12 +170,25 @@ fn figures<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Vec
     let raw = figure("raw-gigabytes", naive, nominal(naive, PhotonLayout::Jensen).raw_bytes());
     let of_order =
         |order| figure("gigabytes", order, nominal(order, PhotonLayout::Jensen).photon_map_bytes());
-    let requested = nominal(naive, PhotonLayout::Jensen);
-    let of_gather = requested.raw_bytes().value / requested.gathers().value;
-    let of_gather = Figure::new("reordering.raw-bytes-of-a-gather.naive", key(CORNELL), of_gather, "bytes");
+    let gathers = |tile: &TileMeasurement| tile.counters.gathers as f64;
+    let Ratio { value, lower, upper } =
+        nominal(naive, PhotonLayout::Jensen).ratio(|tile| tile.photon_map().raw_bytes as f64, gathers);
+    let of_gather = Figure::new("reordering.raw-bytes-of-a-gather.naive", key(CORNELL), value, "bytes");
+    let of_gather = of_gather.within(lower, upper);
     let bound = nominal(None, PhotonLayout::Lines).photon_map_bytes();
     let bound = Figure::new("reordering.gigabytes.hilbert-lines", key(CORNELL), bound.value / GIGA, "GB");
-    ORDERS.map(Some).into_iter().chain([None]).map(of_order).chain([raw, of_gather, bound]).collect()
+    let [.., (_, many_ways)] = associativities();
+    let many_ways = point(scale, Some(GatherOrder::Hash), PhotonLayout::Jensen, many_ways);
+    let many_ways = results.traffic(&many_ways).photon_map_bytes();
+    let many_ways =
+        Figure { name: "reordering.gigabytes.hash-32-ways-hashed".to_owned(), ..figure("", None, many_ways) };
+    ORDERS
+        .map(Some)
+        .into_iter()
+        .chain([None])
+        .map(of_order)
+        .chain([raw, of_gather, bound, many_ways])
+        .collect()
 }
 
 /// Table with a row for every order and layout, measured with the nominal caches.

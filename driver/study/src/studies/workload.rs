@@ -71,8 +71,11 @@ pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -
 
 /// Cost of a tile by counted arithmetic.
 pub(super) fn counted(tile: &TileMeasurement, symbols: &Symbols) -> Cost {
-    let work = Work::new(&tile.counters, &tile.contents, symbols.gather_rays);
-    Cost::counted(&of_tile(tile, symbols), &Arithmetic::of(&work))
+    Cost::counted(&of_tile(tile, symbols), &arithmetic(tile, symbols))
+}
+
+pub(super) fn arithmetic(tile: &TileMeasurement, symbols: &Symbols) -> Arithmetic {
+    Arithmetic::of(&Work::new(&tile.counters, &tile.contents, symbols.gather_rays))
 }
 
 /// Time that a chip takes for each tile, seconds: `max(bytes from DRAM / bandwidth, counted FLOPs / FLOPS)`.

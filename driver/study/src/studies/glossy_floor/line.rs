@@ -5,11 +5,12 @@ use photoncard_picture::choice::Choice;
 use photoncard_render::Sampling;
 
 use super::super::super::laboratory::Results;
+use super::super::super::measure::{Measurement, TileMeasurement};
 use super::super::super::point::Point;
 use super::super::super::report::Figure;
 use super::super::super::sample::{Estimate, Ratio};
 use super::super::super::scale::Scale;
-use super::super::present::{GLOSSY, key};
+use super::super::present::{GIGA, GLOSSY, key};
 
 /// A line of the figure: order of the gathers, and sampling of the rays.
 pub(super) type Line = (GatherOrder, Sampling);
@@ -56,23 +57,24 @@ pub(super) fn curve(scale: &Scale, results: &Results, line: Line, is_cached: boo
 
 /// Ratio of the last value of a curve to its first.
 pub(super) fn change(curve: &[Estimate]) -> f64 {
-    change_within(curve).value
+    curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
 }
 
-/// Ratio of the last value of a curve to its first, with its confidence interval.
-fn change_within(curve: &[Estimate]) -> Ratio {
-    let [first, last] = [curve.first(), curve.last()].map(|end| end.copied().unwrap_or_default());
-    Ratio::new(last, first, 0.0)
-}
-
-/// Key figures of a curve: its change, with the confidence interval, and its spread. `name` returns the name
-/// of a quantity's figure.
-pub(super) fn figures(curve: &[Estimate], name: impl Fn(&str) -> String) -> [Figure; 2] {
-    let Ratio { value, lower, upper } = change_within(curve);
-    [
-        Figure::new(name("last-over-first"), key(GLOSSY), value, "").within(lower, upper),
-        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(curve), ""),
-    ]
+/// Key figures of measurements over the exponent: change, with the confidence interval of the tiles that all
+/// have in common, spread, and greatest value. `name` returns the name of a quantity's figure.
+pub(super) fn figures(measured: &[&Measurement], name: impl Fn(&str) -> String) -> Vec<Figure> {
+    let bytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64;
+    let curve: Vec<_> = measured.iter().map(|measured| measured.photon_map_bytes()).collect();
+    let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
+    let change = measured.last().zip(measured.first()).map(|(last, first)| last.over(first, bytes));
+    let change = change.map(|Ratio { value, lower, upper }| {
+        Figure::new(name("last-over-first"), key(GLOSSY), value, "").within(lower, upper)
+    });
+    let others = [
+        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
+        Figure::new(name("greatest-gigabytes"), key(GLOSSY), greatest / GIGA, "GB"),
+    ];
+    change.into_iter().chain(others).collect()
 }
 
 /// Ratio of the maximum of a curve to its minimum.

@@ -95,7 +95,9 @@ fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool
     let panel = if is_cached { "with-cache" } else { "without-cache" };
     let name = |quantity: &str| format!("figure-6.17.{quantity}.{panel}.{}", slug(&line_name(line)));
     let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), mean(&curve), "GB");
-    line::figures(&curve, name).into_iter().chain([mean]).collect()
+    let at = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
+    let measured: Vec<_> = exponents(scale).into_iter().map(at).collect();
+    line::figures(&measured, name).into_iter().chain([mean]).collect()
 }
 
 fn panels(scale: &Scale, results: &Results, bytes: fn(&Measurement) -> Estimate) -> Vec<Panel> {

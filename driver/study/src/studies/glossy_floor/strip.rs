@@ -104,10 +104,11 @@ pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
     let mut figures: Vec<_> = LINES
         .iter()
         .flat_map(|&line| {
-            let curve = curve(scale, results, line);
+            let at = |exponent| results.traffic(&point(scale, line, exponent));
+            let measured: Vec<_> = exponents(scale).into_iter().map(at).collect();
             let name =
                 |quantity: &str| format!("figure-6.17.{quantity}.floor-alone.{}", slug(&line_name(line)));
-            line::figures(&curve, name)
+            line::figures(&measured, name)
         })
         .collect();
     figures.push(Figure::new("figure-6.17.verdict", key(GLOSSY), verdict(scale, results), ""));

@@ -5,10 +5,11 @@ mod technique;
 mod worth;
 
 use self::technique::{
-    ALL_IN_LINES, ALL_ON_LARGE, BY_CACHE_ERROR, CACHE, COMBINED, EXACT, MAX_TRAFFIC_RAYS, NAIVE, TILED,
-    Technique, techniques,
+    ALL_IN_LINES, ALL_ON_LARGE, BY_CACHE_ERROR, CACHE, COMBINED, EXACT, LINES, MAX_TRAFFIC_RAYS, NAIVE,
+    TILED, Technique, techniques,
 };
 use self::worth::{AtQuality, Measured};
+use super::super::dissertation::NOT_REACHED;
 use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YScale, slug};
@@ -230,22 +231,22 @@ fn best_by_cache_error(measured: &Measured) -> Option<(&'static Technique, Ratio
     factors.max_by(|(_, first), (_, second)| first.value.total_cmp(&second.value))
 }
 
-/// Sentence that names the best error bound of the irradiance cache, and those whose intervals overlap with
-/// its own.
+/// Sentence that names the best error bound of the irradiance cache, and those from which no difference is
+/// shown.
 fn best_error(measured: &Measured) -> Option<String> {
     let error = |technique: &Technique| {
         technique.irradiance_error.map_or_else(String::new, |error| error.to_string())
     };
     let (best, factor) = best_by_cache_error(measured)?;
     let is_close = |technique: &&Technique| {
-        let other = measured.factor_at_quality(technique);
-        technique.name != best.name && other.is_some_and(|other| other.upper >= factor.lower)
+        let other = measured.factor_over(technique, best);
+        technique.name != best.name && other.is_some_and(|other| other.lower <= 1.0)
     };
     let close: Vec<_> = BY_CACHE_ERROR.iter().filter(is_close).map(error).collect();
     let close = if close.is_empty() {
-        "no other interval overlaps".to_owned()
+        "the others read more".to_owned()
     } else {
-        format!("the interval of {} overlaps", close.join(", "))
+        format!("no difference is shown from {}", close.join(" and "))
     };
     Some(format!(
         "with gathers in card memory and errors of the irradiance cache of {}, {} reads the fewest bytes at equal quality, {} times \
@@ -270,6 +271,16 @@ fn verdicts(measured: &Measured) -> String {
     COMPARISONS.map(verdict).join("; ")
 }
 
+/// Figure of a factor at equal quality; `None` if that quality is not reached.
+fn factor_figure(name: &str, scene: &str, factor: Option<Ratio>) -> Figure {
+    match factor {
+        Some(Ratio { value, lower, upper }) => {
+            Figure::new(name, key(scene), value, "times").within(lower, upper)
+        }
+        None => Figure::new(name, key(scene), NOT_REACHED, ""),
+    }
+}
+
 fn figures(measured: &Measured) -> Vec<Figure> {
     let Measured { scale, scene, .. } = *measured;
     let naive = measured.quality(&NAIVE, scale.gather_rays);
@@ -289,26 +300,16 @@ fn figures(measured: &Measured) -> Vec<Figure> {
         figures.push(
             figure(&format!("factor.{slug}"), factor.value, "times").within(factor.lower, factor.upper),
         );
-        figures.push(match measured.factor_at_quality(technique) {
-            Some(Ratio { value, lower, upper }) => {
-                figure(&format!("factor-at-equal-quality.{slug}"), value, "times").within(lower, upper)
-            }
-            None => Figure::new(
-                format!("techniques.factor-at-equal-quality.{slug}"),
-                key(scene),
-                "not reached",
-                "",
-            ),
-        });
+        let name = format!("techniques.factor-at-equal-quality.{slug}");
+        figures.push(factor_figure(&name, scene, measured.factor_at_quality(technique)));
     }
-    let [tiled, cached] =
-        [&TILED, &CACHE].map(|technique| measured.traffic(technique, scale.gather_rays).dram_bytes());
-    let Ratio { value, lower, upper } = Ratio::new(cached, tiled, 0.0);
+    let Ratio { value, lower, upper } = measured.bytes_over(&CACHE, &TILED);
     let saved = figure("saved-share.irradiance-cache", 1.0 - value, "");
     figures.push(saved.within(1.0 - upper, 1.0 - lower));
-    let over_exact = measured.factor(&EXACT, &ALL_IN_LINES);
-    let named = figure("factor-over-exact-reordering.all-techniques", over_exact.value, "times");
-    figures.push(named.within(over_exact.lower, over_exact.upper));
+    let Ratio { value, lower, upper } = measured.bytes_over(&LINES, &EXACT);
+    figures.push(figure("lines-over-reordering", value, "times").within(lower, upper));
+    let over_exact = "techniques.factor-over-exact-reordering.all-techniques";
+    figures.push(factor_figure(over_exact, scene, measured.factor_over(&EXACT, &ALL_IN_LINES)));
     let best = best_by_cache_error(measured).and_then(|(technique, _)| technique.irradiance_error);
     figures.extend(
         best.map(|error| Figure::new("techniques.best-cache-error", key(scene), error.to_string(), "")),

@@ -40,6 +40,8 @@ pub(super) const CACHE: Technique =
     Technique { name: "irradiance cache, tiled", irradiance_error: Some(IRRADIANCE_ERROR), ..TILED };
 pub(super) const COMBINED: Technique =
     Technique { name: "combined sampling", sampling: Sampling::Product, ..NAIVE };
+/// The data structure alone.
+pub(super) const LINES: Technique = Technique { name: "lines", layout: PhotonLayout::Lines, ..NAIVE };
 pub(super) const EXACT: Technique = Technique {
     name: "sort, lines, largest tiles",
     order: GatherOrder::Sort,
@@ -96,7 +98,7 @@ const ON_CHIP: [Technique; 13] = [
     TILED,
     CACHE,
     COMBINED,
-    Technique { name: "lines", layout: PhotonLayout::Lines, ..NAIVE },
+    LINES,
     EXACT,
     Technique {
         name: "sort, lines, largest tiles, precomputed irradiance",

@@ -2,7 +2,7 @@
 //! with their intervals, and conclusions.
 
 use super::super::super::laboratory::Results;
-use super::super::super::measure::Measurement;
+use super::super::super::measure::{Measurement, TileMeasurement};
 use super::super::super::quality::Quality;
 use super::super::super::sample::{Estimate, Ratio, jackknife_half_width};
 use super::super::super::scale::Scale;
@@ -74,10 +74,15 @@ pub(super) struct Worth {
 }
 
 impl Worth {
-    /// Number of rays with its 95 % interval.
+    /// Number of rays with its 95 % interval, one end of which is open if the number is a bound.
     pub(super) fn rays(&self) -> Ratio {
         let value = self.at.rays();
-        Ratio { value, lower: value / self.rays_spread.exp(), upper: value * self.rays_spread.exp() }
+        let [lower, upper] = [value / self.rays_spread.exp(), value * self.rays_spread.exp()];
+        match self.at {
+            AtQuality::Met(_) => Ratio { value, lower, upper },
+            AtQuality::AtMost(_) => Ratio { value, lower: 0.0, upper },
+            AtQuality::Missed(_) => Ratio { value, lower, upper: f64::INFINITY },
+        }
     }
 }
 
@@ -117,8 +122,7 @@ impl Measured<'_> {
         if technique.name == NAIVE.name {
             return Ratio::ONE;
         }
-        let bytes = |technique| self.traffic(technique, self.scale.gather_rays).dram_bytes();
-        Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
+        self.bytes_over(&NAIVE, technique)
     }
 
     pub(super) fn worth(&self, technique: &Technique) -> Worth {
@@ -142,8 +146,15 @@ impl Measured<'_> {
         }
     }
 
+    /// Ratio of the bytes of two techniques at equal rays.
+    pub(super) fn bytes_over(&self, base: &Technique, technique: &Technique) -> Ratio {
+        let [base, other] =
+            [base, technique].map(|technique| self.traffic(technique, self.scale.gather_rays));
+        base.over(other, TileMeasurement::all_bytes)
+    }
+
     /// Ratio of the bytes of `base` to those of `technique` at the naive render's error.
-    pub(super) fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
+    fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
         if technique.name == base.name {
             return Ratio::ONE;
         }
@@ -154,8 +165,14 @@ impl Measured<'_> {
     /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if the
     /// technique does not reach that error.
     pub(super) fn factor_at_quality(&self, technique: &Technique) -> Option<Ratio> {
+        self.factor_over(&NAIVE, technique)
+    }
+
+    /// Ratio of the bytes of `base` to those of `technique` at the naive render's error; `None` if the
+    /// technique does not reach that error.
+    pub(super) fn factor_over(&self, base: &Technique, technique: &Technique) -> Option<Ratio> {
         let is_reached = !matches!(self.worth(technique).at, AtQuality::Missed(_));
-        is_reached.then(|| self.factor(&NAIVE, technique))
+        is_reached.then(|| self.factor(base, technique))
     }
 
     /// Part of a sentence that states whether `technique` reads fewer bytes than `base` at the naive render's
