@@ -81,8 +81,12 @@ impl<'a> Dispatcher<'a> {
                     self.scheduler().give_back(card, tile.id, was_at_work, now);
                     self.changed.notify_all();
                 }
-                // A card under test has no job, and is no card of a render.
-                Event::Computed(_) | Event::MemoryTested(_) => {}
+                // Cards under test, and those of a relay, are no cards of a render.
+                Event::Computed(_)
+                | Event::MemoryTested(_)
+                | Event::Checksums(_)
+                | Event::ImageAccepted
+                | Event::Refused(_) => {}
             }
         }
         let result = self.scheduler().check(now);

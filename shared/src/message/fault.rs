@@ -82,6 +82,9 @@ pub enum Invariant {
     Reply,
     /// Card memory must have room for all lines of gathers, results and blocks for which it was reserved.
     Room,
+    /// A card of a relay must send only replies that a card sends. The relay cannot revoke what the card has
+    /// rendered.
+    Relayed,
 }
 
 impl Invariant {

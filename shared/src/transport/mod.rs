@@ -58,6 +58,11 @@ impl Transport {
         self.session.begin(number);
     }
 
+    /// Number of the present session; `None` before the first.
+    pub fn session(&self) -> Option<u32> {
+        self.session.number()
+    }
+
     /// Returns whether another message fits in the window.
     pub fn can_send(&self) -> bool {
         self.session.on_their_way() < WINDOW as u16

@@ -153,6 +153,10 @@ impl LinkSession {
         self.incoming.iter_mut().for_each(|incoming| incoming.has_come = false);
     }
 
+    pub(super) fn number(&self) -> Option<u32> {
+        self.number
+    }
+
     pub(super) fn on_their_way(&self) -> u16 {
         self.next.wrapping_sub(self.oldest)
     }

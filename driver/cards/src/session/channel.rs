@@ -53,6 +53,16 @@ impl Channel {
         self.commands.is_empty() && self.transport.can_send()
     }
 
+    /// Returns whether all commands have arrived at the card.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.commands.is_empty() && self.transport.is_acknowledged()
+    }
+
+    /// Number of commands that wait for room in the send window.
+    pub(super) fn waiting(&self) -> usize {
+        self.commands.len()
+    }
+
     /// Sends waiting commands while the window has room.
     pub(super) fn forward(&mut self) {
         while self.transport.can_send()

@@ -132,22 +132,34 @@ fn time(seconds: f64) -> Duration {
 /// Maximum number of failures without a completed tile.
 const MAX_FAILURES: u32 = 4;
 
-#[derive(Default)]
 pub(super) struct Failures {
+    /// Maximum number of failures without a completed tile.
+    most: u32,
     /// Number of resets and standstills since the last completed tile.
     failed: u32,
     /// Number of lines that the card has written. A smaller number in its next hello reveals a reset.
     written_lines: u32,
 }
 
+impl Default for Failures {
+    fn default() -> Self {
+        Self { most: MAX_FAILURES, failed: 0, written_lines: 0 }
+    }
+}
+
 impl Failures {
+    /// Creates the count of a card whose first failure is an error.
+    pub(super) fn none_allowed() -> Self {
+        Self { most: 0, ..Self::default() }
+    }
+
     /// Counts a reset or a standstill.
     ///
     /// # Errors
-    /// If there are more than [`MAX_FAILURES`].
+    /// If there are more than the maximum.
     pub(super) fn count(&mut self) -> Result<(), SessionError> {
         self.failed += 1;
-        if self.failed > MAX_FAILURES { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
+        if self.failed > self.most { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
     }
 
     /// Forgets the written lines after a known reset, so that the next hello does not count the reset again.

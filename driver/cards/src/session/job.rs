@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use photoncard_picture::sink::FinishedTile;
-use photoncard_shared::message::{FrameParameters, MemoryTest, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, MemoryTest, Tile};
 
 use super::{PixelLimits, Upload};
 
@@ -51,6 +51,12 @@ pub enum Event {
         /// True if the card may have been working on the tile, which may have caused the loss.
         was_at_work: bool,
     },
+    /// A relayed card has computed the requested checksums, eight bytes each.
+    Checksums(Vec<u8>),
+    /// A relayed card has accepted a card image.
+    ImageAccepted,
+    /// A relayed card has refused a card image or a frame.
+    Refused(Fault),
     /// Results of the self-test's arithmetic for each requested triple of operands, in order.
     Computed(Vec<u8>),
     /// Progress or result of a memory test.

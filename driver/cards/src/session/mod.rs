@@ -10,6 +10,7 @@ mod clock;
 mod error;
 mod job;
 mod pixel_limits;
+mod relayed;
 mod replies;
 mod self_test;
 mod tiles;
@@ -39,8 +40,8 @@ use self::tiles::TilesInFlight;
 use self::upload::{Comparison, Load};
 
 /// Maximum number of unanswered tiles of a card, whatever its budget. If the card is lost, all of them are
-/// delayed.
-const MAX_CREDITS: u32 = 64;
+/// delayed. Only a relay, which deals its tiles on to cards of its own, has room for more than some tens.
+pub const MAX_CREDITS: u32 = 1024;
 
 /// Session with one card.
 pub struct Session {
@@ -53,6 +54,8 @@ pub struct Session {
     /// Checksum of the card image that the card is assumed to hold.
     assumed: Option<u64>,
     load: Load,
+    /// True if the card's commands come from the host of a relay ([`Self::relayed`]).
+    is_relayed: bool,
     /// Requested part of the self-test.
     request: Request,
     tiles: TilesInFlight,
@@ -83,6 +86,7 @@ impl Session {
             comparison: Comparison::default(),
             assumed: None,
             load: Load::default(),
+            is_relayed: false,
             request: Request::Nothing,
             tiles: TilesInFlight::default(),
             stale_replies: 0,
@@ -253,6 +257,8 @@ impl Session {
     fn is_waiting(&self) -> bool {
         match self.state {
             State::Ready => false,
+            // The next lines may be late, and it is not the card that they wait for.
+            State::Loading if self.is_relayed => !self.channel.is_quiet(),
             State::Rendering => !self.tiles.is_empty() || !self.channel.transport.is_acknowledged(),
             _ => true,
         }
@@ -369,7 +375,7 @@ impl Session {
         let rays = self.job.as_ref().map_or(0, |job| self.tiles.most_rays(self.at_work(), &job.frame));
         let result = self.clock.check(rays, slowest, now);
         match result {
-            Err(SessionError::Standstill(_)) => self.fail()?,
+            Err(SessionError::Standstill(_)) if !self.is_relayed => self.fail()?,
             Err(SessionError::Silent(time)) if self.is_garbled() => {
                 return Err(SessionError::Garbled { time, bytes: self.unheard_bytes });
             }

@@ -28,8 +28,9 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
-    /// Minimum and maximum depth of a sample, in steps of 1 / [`DEPTH_STEPS`] depth units.
-    depths: [f64; 2],
+    /// Minimum and maximum depth of a sample, in steps of 1 / [`DEPTH_STEPS`] depth units; `None` if no value
+    /// is checked.
+    depths: Option<[f64; 2]>,
 }
 
 /// Invalid value of a channel.
@@ -46,7 +47,13 @@ impl PixelLimits {
         let format = SumFormat::new(header, frame);
         let steps = f64::from(DEPTH_STEPS) / f64::from(format.scale.depth);
         let rounding = f64::from(DEPTH_ROUNDING * (header.reach + eye)) * steps + 1.0;
-        Self { format, depths: [-rounding, farthest_corner(header, frame) * steps + rounding] }
+        Self { format, depths: Some([-rounding, farthest_corner(header, frame) * steps + rounding]) }
+    }
+
+    /// Creates limits that any value meets, for a relay, whose host checks the values. The units of the
+    /// format are those of an empty scene.
+    pub fn unchecked(frame: &FrameParameters) -> Self {
+        Self { format: SumFormat::new(&Header::EMPTY, frame), depths: None }
     }
 
     /// Format of the sums.
@@ -56,6 +63,7 @@ impl PixelLimits {
 
     /// Returns the first invalid value of a pixel; `None` if all are valid.
     pub(super) fn find_bad(&self, sums: &PixelSums) -> Option<BadValue> {
+        let depths = self.depths?;
         let PixelSums { light, albedo, normal, depth, surfaces, layers } = *sums;
         let seen = f64::from(surfaces);
         let find = |channel, values: [f64; 3], is_possible: &dyn Fn(f64) -> bool| {
@@ -71,7 +79,7 @@ impl PixelLimits {
             (!is_possible).then_some(BadValue { channel, value: f64::from(count) })
         };
         let is_albedo = |value: f64| value <= seen * f64::from(ALBEDO_STEPS);
-        let [least, most] = self.depths.map(|depth| depth * seen);
+        let [least, most] = depths.map(|depth| depth * seen);
         let is_deep = (least..=most).contains(&(depth as f64)) && (surfaces > 0 || depth == 0);
         find_count("surfaces", surfaces)
             .or_else(|| find_light("radiance", light))

@@ -14,6 +14,9 @@ impl Session {
     /// # Errors
     /// If it reports a fault, or does not answer a request.
     pub(super) fn take(&mut self, reply: &Reply) -> Result<(), SessionError> {
+        if self.take_relayed(reply)? {
+            return Ok(());
+        }
         match (self.state, *reply) {
             (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
                 build.clone_into(&mut self.build);

@@ -10,6 +10,11 @@ use super::{Event, SessionError};
 #[derive(Clone, Copy)]
 pub(super) enum Request {
     Nothing,
+    /// Checksums of a number of chunks from the first, for the host of a relay.
+    Checksums {
+        first: u32,
+        count: u32,
+    },
     /// Results of this number of operand triples.
     Compute(usize),
     /// Memory test with the last reported progress; `None` before the first report.

@@ -108,6 +108,11 @@ impl Comparison {
         Self { written, ..Self::default() }
     }
 
+    /// Number of lines that the card has written.
+    pub(super) fn written(&self) -> u32 {
+        self.written
+    }
+
     /// Command that requests the next checksums; `None` after all chunks that the card has written.
     pub(super) fn next_question(&mut self, upload: &Upload) -> Option<Command<'static>> {
         // An incomplete chunk, of the card or of the card image, is not compared.

@@ -55,6 +55,12 @@ impl HostPort {
         Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false, say }
     }
 
+    /// Closes the connection to the present host. A host on a pseudo terminal is only left unheard until its
+    /// next bytes.
+    pub fn hang_up(&mut self) {
+        self.host = None;
+    }
+
     fn check_stop(&self) -> Result<(), PortError> {
         if self.stop.load(Ordering::Relaxed) { Err(PortError::Closed) } else { Ok(()) }
     }
