@@ -134,7 +134,7 @@ pub(super) fn greet_port(
 
 /// Random number that identifies a session, because frames of earlier sessions may still arrive. Two numbers
 /// are equal with probability 2^-32.
-fn session_number() -> u32 {
+pub(super) fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32
 }

@@ -26,6 +26,7 @@ mod passes;
 mod prepared;
 mod provenance;
 pub mod quality;
+pub mod relay;
 mod renderer;
 mod self_test;
 mod settings;

@@ -209,7 +209,7 @@ pub(super) fn reopen(
 /// Tries to connect once, on a separate thread. Sends the port, or `None` on failure, to the returned
 /// receiver. The attempt can take seconds. A render can end meanwhile: it drops the receiver, and the port is
 /// then closed.
-fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
+pub(super) fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {
         // The receiver is gone if the render has ended.

@@ -60,6 +60,10 @@ impl Queue {
         Self { bytes: VecDeque::new(), capacity: 1 << random.below(13) }
     }
 
+    pub(crate) fn of(capacity: usize) -> Self {
+        Self { bytes: VecDeque::new(), capacity }
+    }
+
     /// Appends the first of `bytes`, at most `most`. Returns their number.
     pub(crate) fn push(&mut self, bytes: &[u8], most: usize, faults: &Faults, random: &mut Random) -> usize {
         let count = bytes.len().min(most).min(self.capacity.saturating_sub(self.bytes.len()));

@@ -11,6 +11,7 @@ mod liar;
 
 mod lies;
 mod line;
+mod relay;
 mod run;
 mod station;
 mod world;

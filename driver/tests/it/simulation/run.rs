@@ -50,7 +50,7 @@ pub(crate) struct Outcome {
 }
 
 /// Counters without those that depend on the tiles that a chip has in flight together.
-fn work(counters: Counters) -> Counters {
+pub(crate) fn work(counters: Counters) -> Counters {
     Counters { drains: 0, most_waiting: 0, ..counters }
 }
 

@@ -103,10 +103,18 @@ impl CardMemory for Memory {
 /// Number of tiles in flight of a chip.
 pub(crate) const IN_FLIGHT: u32 = 3;
 
-/// A micro chip with several tiles in flight.
+/// Budget of the cards: that of a micro chip, with several tiles in flight.
+pub(crate) const BUDGET: Budget = Budget {
+    sram_bytes: 512 << 10,
+    dram_bytes: (DRAM_LINES * LINE_BYTES) as u64,
+    tiles: 4,
+    in_flight: IN_FLIGHT,
+    waiting_blocks: 4,
+    ..MICRO
+};
+
 fn chip() -> EmulatedChip {
-    let budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: IN_FLIGHT, waiting_blocks: 4, ..MICRO };
-    EmulatedKind::Micro.emulated().with_budget(budget).chip()
+    EmulatedKind::Micro.emulated().with_budget(BUDGET).chip()
 }
 
 /// Shared state of all runs.
@@ -141,6 +149,20 @@ impl Fixture {
             frame(GatherOrder::Buckets, 20, Some(0.05), "none"),
             frame(GatherOrder::Buckets, 1000, None, "all"),
         ]
+    }
+
+    /// A frame with adaptive sampling.
+    pub(crate) fn adaptive() -> Self {
+        let settings = settings().with(|s| {
+            s.integrator.samples = 6;
+            s.integrator.adaptive_threshold = Some(0.01);
+        });
+        Self::of(&scene(), settings)
+    }
+
+    /// A frame with this number of photons, some ten to a line.
+    pub(crate) fn of_photons(count: usize) -> Self {
+        Self::of(&scene(), settings().with(|s| s.photons.count = count))
     }
 
     /// This frame without a queue, one tile after another.
