@@ -6,6 +6,7 @@ use miette::MietteDiagnostic;
 use photoncard_driver::emulator::{EmulatedKind, serve_card};
 use photoncard_driver::link::{HostPort, ListedPort, Listener, list_serial_ports};
 use photoncard_driver::printable::printable;
+use photoncard_driver::render::relay::RelayCards;
 use photoncard_driver::render::{
     ArithmeticTest, CardAddress, MAX_BINS, MemoryUse, PatternTest, RenderError, SelfTest, WrongResult,
     card_info, card_ping, card_self_test,
@@ -213,9 +214,10 @@ fn test_failure(test: &SelfTest) -> Failure {
     ))
 }
 
-/// Serves an emulated card to one host after another until an interrupt.
+/// Serves an emulated card, or a relay, to one host after another until an interrupt.
 pub(crate) fn emulate(options: &EmulateOptions) -> Result<(), Failure> {
     let stop = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
+    let cards = relayed_cards(options)?;
     let listener = Listener::new(&options.listen).map_err(Failure::work)?;
     if listener.is_public() {
         let address = listener.card_address();
@@ -224,10 +226,28 @@ pub(crate) fn emulate(options: &EmulateOptions) -> Result<(), Failure> {
         ));
     }
     print(&[listener.card_address().to_owned()])?;
-    let kind = options.card.model.kind().emulated();
-    let chip = options.card_memory.map_or(kind, |bytes| kind.with_memory(bytes));
-    serve_card(chip, &mut HostPort::new(listener, stop, say)).map_err(|error| Failure::work_error(&error))?;
+    let mut port = HostPort::new(listener, stop, say);
+    if let Some(cards) = cards {
+        cards.serve(&mut port, &say);
+    } else {
+        let kind = options.card.model.kind().emulated();
+        let chip = options.card_memory.map_or(kind, |bytes| kind.with_memory(bytes));
+        serve_card(chip, &mut port).map_err(|error| Failure::work_error(&error))?;
+    }
     Err(Failure::Stopped("stopped; the card is gone"))
+}
+
+/// Opens the cards of a relay; `None` without `--relay`.
+fn relayed_cards(options: &EmulateOptions) -> Result<Option<RelayCards>, Failure> {
+    if options.relay.is_empty() {
+        return Ok(None);
+    }
+    let of_memory = |address: &CardAddress| match options.card_memory {
+        Some(bytes) => address.clone().with_memory(bytes),
+        None => address.clone(),
+    };
+    let addresses: Vec<CardAddress> = options.relay.iter().map(of_memory).collect();
+    Ok(Some(RelayCards::open(&addresses)?))
 }
 
 #[cfg(test)]

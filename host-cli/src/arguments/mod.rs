@@ -149,7 +149,7 @@ pub(crate) enum Command {
     /// Query or test a card, or list serial ports
     #[command(subcommand)]
     Card(CardCommand),
-    /// Serve an emulated card to other processes, one host at a time, until interrupted
+    /// Serve an emulated card, or many cards as one, to other processes, until interrupted
     Emulate(EmulateOptions),
     /// Compare a picture with a reference
     Diff(DiffOptions),
@@ -225,9 +225,20 @@ pub(crate) struct EmulateOptions {
     pub(crate) listen: ListenAddress,
     #[command(flatten)]
     pub(crate) card: ChipOption,
-    /// Memory of the card, in bytes or with the suffix K, M or G [default: that of its kind]
+    /// Memory of each emulated card, in bytes or with the suffix K, M or G [default: that of its kind]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub(crate) card_memory: Option<u64>,
+    #[arg(
+        long = "relay",
+        value_name = "CARD",
+        conflicts_with = "model",
+        help_heading = "Cards",
+        help = format!(
+            "Appear as one card, and be the host of this card, which may itself be a relay: {}; may be repeated",
+            CardAddress::forms()
+        )
+    )]
+    pub(crate) relay: Vec<CardAddress>,
 }
 
 #[derive(Args)]

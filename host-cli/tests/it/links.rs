@@ -45,6 +45,51 @@ fn pictures_are_equal_over_every_link() {
 }
 
 #[test]
+fn a_relay_of_cards_and_relays_is_one_card() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let render = |name: &str, cards: &[&str]| {
+        let mut options = vec!["-o", name, "--size", "64x64", "--photons", "1000", "--quiet"];
+        options.extend(cards.iter().flat_map(|card| ["--card", card]));
+        let outcome = room.rendered(&cornell, &options);
+        (room.read(name), outcome.stderr)
+    };
+    let (expected, _) = render("emulated.exr", &["emulated:1"]);
+    let card = Emulator::start(&room, "tcp:", &["--card", "emulated-micro"]);
+    let inner = Emulator::start(&room, "unix:inner", &["--relay", "emulated:2", "--card-memory", "64M"]);
+    let cards = ["--relay", &card.address, "--relay", &inner.address, "--relay", "emulated-large:1"];
+    let outer = Emulator::start(&room, "tcp:", &cards);
+    for _ in 0..2 {
+        assert!(render("a.exr", &[&outer.address]) == (expected.clone(), String::new()));
+    }
+    let outcome = room.run(&["card", "info", "--card", &outer.address]);
+    assert!(
+        outcome.stdout.contains("of 3 cards") && outcome.stdout.contains(", 18 at once"),
+        "{}",
+        outcome.stdout
+    );
+    card.end("-INT");
+    assert!(render("a.exr", &[&outer.address]) == (expected, String::new()));
+    let (status, said) = outer.end("-INT");
+    assert!(
+        status == Some(130) && said.matches("card 0 (tcp:").count() == 1 && said.contains("is lost"),
+        "{said}"
+    );
+    let absent = ["emulate", "--listen", "unix:outer", "--relay", "emulated:1", "--relay", &card_of(&said)];
+    check_failed(
+        &room,
+        &room.run(&absent),
+        &["card 1 (tcp:", "nothing listens there"],
+        &["a.exr", "emulated.exr", "inner"],
+    );
+}
+
+/// Address of the card that a message of a relay names.
+fn card_of(said: &str) -> String {
+    said.split(['(', ')']).find(|part| part.starts_with("tcp:")).unwrap().to_owned()
+}
+
+#[test]
 fn a_card_serves_the_next_host_after_a_killed_one() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
