@@ -19,7 +19,7 @@ impl<'a> Dram<'a> {
         Self { lines: Some(lines) }
     }
 
-    /// Memory without lines: that of a static card, until its board gives it lines. All of its bytes are zero.
+    /// Memory without lines: that of a static card until its board gives it lines. Its bytes are zero.
     pub const EMPTY: Self = Self { lines: None };
 
     #[inline(always)]

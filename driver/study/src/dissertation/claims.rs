@@ -298,7 +298,10 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "section 7.1",
         claim: "a simple tree of links to the host suffices",
         published: "",
-        evidence: Evidence::None("trees exist in the cost model alone ([scaling](scaling.md#upload))"),
+        evidence: built(
+            "`photoncard emulate --relay`: trees of hosts, whose pictures are one card's ([scaling](scaling.md#trees-of-hosts))",
+            "driver/tests/it/simulation/relay/mod.rs",
+        ),
     },
     Claim {
         place: "section 7.1",
