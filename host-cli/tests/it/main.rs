@@ -23,6 +23,7 @@ mod passes;
 mod pictures;
 mod prepared;
 mod provenance;
+mod python;
 mod quality;
 mod resume;
 mod self_test;
