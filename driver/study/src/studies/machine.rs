@@ -13,7 +13,7 @@ use super::super::load_balance::Balance;
 use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Column, Figure, Report, Table, XScale, YScale};
-use super::super::sample::Ratio;
+use super::super::sample::{Estimate, Ratio};
 use super::super::scale::Scale;
 use super::super::symbol_axes::SymbolAxes;
 use super::arithmetic::{self, CountedFrame};
@@ -362,6 +362,10 @@ fn symbol_figures(
     let seconds_of_bytes = |tile: &TileMeasurement| tile.all_bytes() / machine.bandwidth;
     let seconds_of_flops = |tile: &TileMeasurement| flops(tile, &|_| true) / machine.flops;
     let of_part = |part| move |unit: Unit| unit.part() == part;
+    // Eye rays are more than pixels: surveys cast some too.
+    let interpolated = measured.total(|tile| tile.counters.interpolated_samples as f64);
+    let Estimate { value, half_width } = interpolated.scaled(1.0 / symbols.pixels());
+    let interpolated = Ratio { value, lower: value - half_width, upper: value + half_width };
     [
         ("flops-of-a-ray", measured.ratio(|tile| flops(tile, &of_part(ChipPart::RayCaster)), rays), "FLOPs"),
         (
@@ -375,14 +379,7 @@ fn symbol_figures(
             "FLOPs",
         ),
         ("bytes-of-a-gather", measured.ratio(|tile| tile.photon_map().dram_bytes as f64, gathers), "bytes"),
-        (
-            "interpolated-share",
-            measured.ratio(
-                |tile| tile.counters.interpolated_samples as f64,
-                |tile| tile.counters.eye_rays as f64,
-            ),
-            "",
-        ),
+        ("interpolated-share", interpolated, ""),
         ("bandwidth-over-arithmetic", measured.ratio(seconds_of_bytes, seconds_of_flops), ""),
     ]
     .into_iter()
