@@ -177,7 +177,7 @@ impl Technique {
     /// flight, on whole frames, have fewer numbers.
     pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
         let mut rays = match self.in_flight {
-            Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),
+            Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100], &[12, 50])),
             None => self.sweep(scale),
         };
         rays.retain(|rays| *rays <= MAX_TRAFFIC_RAYS);
