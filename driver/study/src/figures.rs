@@ -13,7 +13,7 @@ use super::dissertation;
 use super::error::StudyError;
 use super::laboratory::Laboratory;
 use super::point::Point;
-use super::report::{Cell, FIGURES, Figure, ReportError, figures_csv, slug};
+use super::report::{Cell, FIGURES, Figure, NOT_REACHED, ReportError, figures_csv, slug};
 use super::scale::Scale;
 
 /// Scene of [`check`].
@@ -84,7 +84,7 @@ fn measured_number(value: &Cell) -> Option<f64> {
     match value {
         Cell::Integer(value) => Some(*value as f64),
         Cell::Real { value, .. } => Some(*value),
-        Cell::Text(text) if text == dissertation::NOT_REACHED => Some(f64::NAN),
+        Cell::Text(text) if text == NOT_REACHED => Some(f64::NAN),
         Cell::Empty | Cell::Text(_) => None,
     }
 }

@@ -40,7 +40,7 @@ pub use self::parts::{Extent, PartError, RECORD, Union, UnitedPoints, unite};
 pub use self::point::{ALONG_CURVE, ImageKey, Point, Task};
 pub use self::quality::{Quality, TileDeviation};
 use self::report::Report;
-pub use self::report::{Cell, Figure, Provenance, ReportError, human};
+pub use self::report::{Cell, Figure, NOT_REACHED, Provenance, ReportError, human};
 pub use self::sample::{Estimate, SampleRate};
 pub use self::scale::Scale;
 pub use self::store::StoreError;

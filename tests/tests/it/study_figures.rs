@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use photoncard_driver::render::PROGRAM;
-use photoncard_driver::study::dissertation::{self, Measured, NOT_REACHED};
-use photoncard_driver::study::{Figure, Laboratory, StudyObserver, check, human};
+use photoncard_driver::study::dissertation::{self, Measured};
+use photoncard_driver::study::{Figure, Laboratory, NOT_REACHED, StudyObserver, check, human};
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde::Deserialize;
 

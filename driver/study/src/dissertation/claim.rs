@@ -1,9 +1,6 @@
 //! A claim of the dissertation, the evidence for it, and its verdict.
 
-use super::super::report::human;
-
-/// Value of a figure of a quality that a technique does not reach.
-pub const NOT_REACHED: &str = "not reached";
+use super::super::report::{NOT_REACHED, human};
 
 /// Value of a key figure, with the ends of its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,11 +109,9 @@ impl FigureOf {
             Some([lower, upper]) if lower < upper => format!(" ({} to {})", number(lower), number(upper)),
             _ => String::new(),
         };
-        let [label, unit] =
-            [(self.label, ""), ("", self.unit)].map(|(before, after)| format!("{before}{after}"));
-        let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
-        let label = if label.is_empty() { label } else { format!("{label} ") };
-        format!("{label}{}{interval}{unit}", number(measured.value))
+        let value = format!("{}{interval}", number(measured.value));
+        let words = [self.label, &value, self.unit];
+        words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
     }
 }
 

@@ -4,7 +4,7 @@ mod claim;
 mod claims;
 
 use self::claim::Evidence;
-pub use self::claim::{Measured, NOT_REACHED};
+pub use self::claim::Measured;
 use self::claims::{CLAIMS, SYMBOLS};
 
 const HEAD: &str = "\

@@ -5,6 +5,9 @@ use super::table::{Cell, Column, Table};
 /// Name of the file with the key figures of a run.
 pub(crate) const FIGURES: &str = "figures.csv";
 
+/// Value of a figure of a quality that a technique does not reach.
+pub const NOT_REACHED: &str = "not reached";
+
 /// A key figure of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {

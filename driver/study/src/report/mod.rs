@@ -16,8 +16,8 @@ use std::{fs, io};
 
 use thiserror::Error;
 
-pub use self::figure::Figure;
 pub(crate) use self::figure::{FIGURES, figures_csv, is_portable, slug};
+pub use self::figure::{Figure, NOT_REACHED};
 pub use self::html::Provenance;
 pub(crate) use self::html::{Block, Report, Section};
 pub use self::number::human;

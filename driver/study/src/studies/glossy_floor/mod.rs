@@ -88,15 +88,12 @@ fn reordering_over_exponent(scale: &Scale, results: &Results) -> Figure {
 
 /// Key figures of a line in one of the panels.
 fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Vec<Figure> {
-    let curve = curve(scale, results, line, is_cached);
-    let mean = |curve: &[Estimate]| {
-        curve.iter().map(|estimate| estimate.value).sum::<f64>() / curve.len() as f64 / GIGA
-    };
     let panel = if is_cached { "with-cache" } else { "without-cache" };
     let name = |quantity: &str| format!("figure-6.17.{quantity}.{panel}.{}", slug(&line_name(line)));
-    let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), mean(&curve), "GB");
     let at = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let measured: Vec<_> = exponents(scale).into_iter().map(at).collect();
+    let sum: f64 = measured.iter().map(|measured| measured.photon_map_bytes().value).sum();
+    let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), sum / measured.len() as f64 / GIGA, "GB");
     line::figures(&measured, name).into_iter().chain([mean]).collect()
 }
 

@@ -9,10 +9,9 @@ use self::technique::{
     TILED, Technique, techniques,
 };
 use self::worth::{AtQuality, Measured};
-use super::super::dissertation::NOT_REACHED;
 use super::super::laboratory::Results;
 use super::super::point::Point;
-use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YScale, slug};
+use super::super::report::{self, Block, Cell, Figure, NOT_REACHED, Report, Table, XScale, YScale, slug};
 use super::super::sample::Ratio;
 use super::super::scale::Scale;
 use super::present::{
