@@ -16,7 +16,7 @@ MEMORY = 64 << 20
 # SRAM, DRAM, caches of photons and scene, stack; pixels of a tile, neighbours, gather rays, waiting gathers,
 # irradiance records, shadow rays, samples, tiles, tiles in flight, waiting blocks.
 BUDGET = (1 << 20, MEMORY, 0, 0, 0, 256, 256, 1 << 14, 1, 512, 64, 4096, 2, 1, 0)
-CHUNK, PIXELS_OF_MESSAGE, COUNTERS = 64 * LINE, 16, 25
+CHUNK, PIXELS_OF_MESSAGE, COUNTERS = 64 * LINE, 16, 26
 MESSAGE, ORDER, TOO_LARGE, LINES, CHUNKS, IMAGE = range(6)
 
 
@@ -65,7 +65,7 @@ class Card(Frames):
         budget = b"".join(map(number, BUDGET))
         build = b"a card in Python"
         written = number(len(self.memory) // LINE)
-        self.send(b"\0" + number(PROTOCOL) + number(LAYOUT) + budget + written + b"\0" + number(len(build)) + build)
+        self.send(b"\0" + number(PROTOCOL) + number(LAYOUT) + budget + written + b"\0" + number(len(build)) + build + b"\0")
 
     def checksums(self, command):
         first, count = command.number(), command.number()

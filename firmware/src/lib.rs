@@ -58,7 +58,8 @@
 //! | [`chip`] | state of a tile; one method for each pass |
 //! | [`self_test`] | test of card memory, and of arithmetic |
 //! | [`card`] | protocol of a card: commands in, replies out |
-//! | [`serve`] | main loop of a card on a port |
+//! | [`serve`] | main loop of a card on a port, or as a task; ring buffer of an interrupt's bytes |
+//! | [`stack`] | measure of the use of a board's stack |
 //!
 //! [`card::Card`] is the whole firmware: it consumes bytes, works in small steps, and produces bytes.
 //! `boards/` contains the images of boards, which add registers and a memory map.
@@ -83,7 +84,7 @@
 //! are in fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits,
 //! because the code uses only integer arithmetic, `libm`, and `f32` addition, multiplication, division and
 //! square root, never a fused multiply-add.
-// `simd` alone is exempt, for its vector instructions.
+// `simd` is exempt, for its vector instructions, and `stack`, which reads a stack as memory.
 #![deny(unsafe_code)]
 #![no_std]
 // A chip never panics: these lints catch what could, and each exception gives its reason.
@@ -117,5 +118,7 @@ pub mod self_test;
 pub mod serve;
 pub mod simd;
 mod slot;
+#[expect(unsafe_code, reason = "what the stack leaves behind is read as memory")]
+pub mod stack;
 mod vector;
 mod wide_tree;

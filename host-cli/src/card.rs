@@ -8,8 +8,8 @@ use photoncard_driver::link::{HostPort, ListedPort, Listener, list_serial_ports}
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::relay::RelayCards;
 use photoncard_driver::render::{
-    ArithmeticTest, CardAddress, MAX_BINS, MemoryUse, PatternTest, RenderError, SelfTest, WrongResult,
-    card_info, card_ping, card_self_test,
+    ArithmeticTest, BoardInfo, CardAddress, MAX_BINS, MemoryUse, PatternTest, RenderError, SelfTest,
+    WrongResult, card_info, card_ping, card_self_test,
 };
 
 use crate::arguments::EmulateOptions;
@@ -26,12 +26,13 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         CardAddress::Emulated { model, .. } => Some(model.kind()),
         CardAddress::Remote(_) => None,
     };
-    let mut lines = vec![
+    let mut lines: Vec<String> = info.board.iter().flat_map(board_rows).collect();
+    lines.extend([
         format!("build           {}", info.build),
         format!("sram            {} bytes", budget.sram_bytes),
         format!("  photon cache  {} bytes", budget.photon_cache_bytes),
         format!("  scene cache   {} bytes", budget.scene_cache_bytes),
-    ];
+    ]);
     lines.extend(kind.map(|kind| format!("  cache tags    {} bytes", kind.tag_bytes())));
     lines.push(format!("  stack         {} bytes", budget.stack_bytes));
     lines.extend(info.memory_use.iter().flat_map(measured_rows));
@@ -52,6 +53,14 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
         format!("samples         {} a pixel", budget.samples),
     ]);
     print(&lines)
+}
+
+/// Returns the table rows of what a board's firmware says of the board.
+fn board_rows(board: &BoardInfo) -> Vec<String> {
+    let BoardInfo { name, serial_number, clock_hz } = board;
+    let named = |row: &str, text: &str| (!text.is_empty()).then(|| format!("{row:<15} {text}"));
+    let clock = (*clock_hz > 0).then(|| format!("clock           {clock_hz} Hz"));
+    [named("board", name), named("serial number", serial_number), clock].into_iter().flatten().collect()
 }
 
 /// Returns the table rows of the stack use and the static data that a board's firmware measures.

@@ -8,6 +8,7 @@ use crate::layout::LEAF_LANES;
 /// Fixed capacities of one kind of chip. A card reports them in [`crate::message::Reply::Hello`]; the host
 /// must not exceed them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
     /// On-chip memory in total, bytes.
     pub sram_bytes: u32,

@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 /// Work done on a tile. The sums over all tiles do not depend on which chip rendered which tile, with two
-/// exceptions: [`Self::drains`] and [`Self::most_waiting`] always depend on it, and all counters do if chips
-/// keep irradiance records
+/// exceptions: [`Self::drains`], [`Self::most_waiting`] and [`Self::cycles`] always depend on it, and all
+/// counters do if chips keep irradiance records
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
     /// Eye rays. A path of a pixel without gather rays takes one. A path of a pixel with gather rays takes at
     /// least two: one to place its gather point, one to complete the pixel. If the gather point is seen in a
@@ -67,6 +68,8 @@ pub struct Counters {
     pub drains: u64,
     /// Maximum number of gathers that were queued at the same time on one chip.
     pub most_waiting: u64,
+    /// Processor cycles of the chip's work; 0 if the board has no counter of cycles.
+    pub cycles: u64,
 }
 
 impl Counters {
@@ -97,6 +100,7 @@ impl Counters {
         points_tested: 0,
         drains: 0,
         most_waiting: 0,
+        cycles: 0,
     };
 
     /// Counts one search for the k nearest photons. The arguments count photons whose distance was computed,
@@ -148,5 +152,6 @@ impl Counters {
         self.points_tested = self.points_tested.saturating_add(other.points_tested);
         self.drains = self.drains.saturating_add(other.drains);
         self.most_waiting = self.most_waiting.max(other.most_waiting);
+        self.cycles = self.cycles.saturating_add(other.cycles);
     }
 }

@@ -237,6 +237,7 @@ impl Lights {
 
 /// Reason why a header is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HeaderError {
     /// The card image does not begin with [`MAGIC`].
     Magic,

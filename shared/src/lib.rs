@@ -71,6 +71,7 @@ pub mod address;
 pub mod budget;
 pub mod checksum;
 pub mod counters;
+pub mod embedded;
 pub mod frame;
 pub mod hash;
 pub mod image;

@@ -214,7 +214,7 @@ fn opcodes_are_pinned() {
     assert_eq!(encoded(&Command::Flush), [9]);
     let hello = |memory_use| {
         let budget = BUDGET;
-        Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x" }
+        Reply::Hello { protocol: 1, layout: 1, budget, written_lines: 0, memory_use, build: "x", board: None }
     };
     let replies = [
         (hello(None), 0),
@@ -228,9 +228,9 @@ fn opcodes_are_pinned() {
     for (reply, opcode) in replies {
         assert_eq!(encoded(&reply)[0], opcode);
     }
-    assert!(encoded(&hello(None)).ends_with(&[0, 0, 1, b'x']));
+    assert!(encoded(&hello(None)).ends_with(&[0, 0, 1, b'x', 0]));
     let memory_use = MemoryUse { static_bytes: 3, stack_bytes: 5, stack_used: 4 };
-    assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x']));
+    assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x', 0]));
 }
 
 /// Compares the version in `docs/protocol.md`, from which other implementations are written, with that of the
@@ -263,10 +263,28 @@ fn structures_have_their_golden_bytes() {
         in_flight: 300,
         waiting_blocks: 15,
     };
-    let hello =
-        Reply::Hello { protocol: 6, layout: 5, budget, written_lines: 14, memory_use: None, build: "x" };
-    let bytes = [0, 6, 5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0xac, 2, 15, 14, 0, 1, b'x'];
+    let hello = Reply::Hello {
+        protocol: 6,
+        layout: 5,
+        budget,
+        written_lines: 14,
+        memory_use: None,
+        build: "x",
+        board: None,
+    };
+    let bytes = [0, 6, 5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0xac, 2, 15, 14, 0, 1, b'x', 0];
     assert_eq!(encoded(&hello), bytes);
+    let board = Some(Board { name: "b", serial_number: "7", clock_hz: 300 });
+    let hello = Reply::Hello {
+        protocol: 6,
+        layout: 5,
+        budget,
+        written_lines: 14,
+        memory_use: None,
+        build: "x",
+        board,
+    };
+    assert!(encoded(&hello).ends_with(&[b'x', 1, 1, b'b', 1, b'7', 0xac, 2]));
 
     let one = 1.0_f32.to_le_bytes();
     let camera = Camera {
@@ -343,9 +361,11 @@ fn structures_have_their_golden_bytes() {
         points_tested: 23,
         drains: 24,
         most_waiting: 300,
+        cycles: 26,
     };
     let bytes = [
-        5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 0xac, 2,
+        5, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 0xac,
+        2, 26,
     ];
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
@@ -386,6 +406,7 @@ fn fault_codes_are_pinned() {
         Depth,
         Operands,
         Internal,
+        Memory,
     ];
     for (number, code) in (0..).zip(codes) {
         assert_eq!(encoded(&Reply::Fault(Fault { code, detail: 7 })), [6, number, 7]);
@@ -395,8 +416,15 @@ fn fault_codes_are_pinned() {
 #[test]
 fn the_versions_of_a_hello_are_read_whatever_follows() {
     let budget = BUDGET;
-    let hello =
-        Reply::Hello { protocol: 300, layout: 2, budget, written_lines: 0, memory_use: None, build: "x" };
+    let hello = Reply::Hello {
+        protocol: 300,
+        layout: 2,
+        budget,
+        written_lines: 0,
+        memory_use: None,
+        build: "x",
+        board: None,
+    };
     let versions = Versions { protocol: 300, layout: 2 };
     assert_eq!(hello_versions(&encoded(&hello)), Some(versions));
     assert_eq!(hello_versions(&[0, 0xac, 2, 2]), Some(versions));

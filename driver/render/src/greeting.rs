@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
 
-use photoncard_cards::session::{LinkBytes, Session, SessionError};
+use photoncard_cards::session::{BoardInfo, LinkBytes, Session, SessionError};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::link::{Port, PortError};
 use photoncard_shared::message::{MemoryUse, Tile};
@@ -65,6 +65,8 @@ pub struct CardInfo {
     pub budget: Budget,
     /// On-chip memory that the firmware uses; `None` if the card does not measure it.
     pub memory_use: Option<MemoryUse>,
+    /// Board that the firmware runs on; `None` if the card is no board.
+    pub board: Option<BoardInfo>,
 }
 
 /// Greets the first card at an address.
@@ -73,7 +75,12 @@ pub struct CardInfo {
 /// If the card cannot be started or reached, or its reply is invalid.
 pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
     let GreetedCard { session, budget, .. } = greet_alone(address, open(address)?, Instant::now())?;
-    Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
+    Ok(CardInfo {
+        build: session.build().to_owned(),
+        budget,
+        memory_use: session.memory_use(),
+        board: session.board().cloned(),
+    })
 }
 
 /// Greets the first card at an address `count` times. Returns the time until each reply.

@@ -40,6 +40,7 @@ pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use observer::{Observer, Phase, Unobserved};
 pub use passes::{Aim, Ending, Passes};
+pub use photoncard_cards::session::BoardInfo;
 pub use photoncard_shared::budget::{Budget, MAX_BINS, MAX_DRAM_BYTES};
 pub use photoncard_shared::message::{Filter, Radiance, Sampling};
 pub use photoncard_shared::message::{MemoryPattern, MemoryUse, WrongWord, WrongWords};

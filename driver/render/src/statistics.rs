@@ -89,6 +89,10 @@ pub struct Statistics {
     pub drains: u64,
     /// Maximum number of gathers that waited at the same time on any chip.
     pub most_waiting: u64,
+    /// Processor cycles of the boards' work on tiles, over all cards; absent without a board that counts
+    /// them. The clock rate is in the card's hello (`photoncard card info`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cycles: Option<u64>,
     /// Floating-point operations of the counted work, by the constants of the dissertation's Table 7.1
     /// (`docs/scaling.md`). Searches for irradiance points are not included.
     pub flops: Flops,
@@ -155,6 +159,7 @@ impl Statistics {
             points_tested: counters.points_tested,
             drains: counters.drains,
             most_waiting: counters.most_waiting,
+            cycles: (counters.cycles > 0).then_some(counters.cycles),
             flops: Flops::by_table(counters, frame.gather_rays),
             image_bytes: prepared.image.bytes(),
             link: LinkStatistics::new(&outcome.links),

@@ -77,9 +77,9 @@ fn a_card_that_comes_back_as_another_is_told_of_and_given_up() {
     std::thread::spawn(move || {
         serve(listener.accept().unwrap().0, sound);
         let other = |command: &Command| match sound(command) {
-            Some(Reply::Hello { layout, budget, written_lines, memory_use, build, .. }) => {
+            Some(Reply::Hello { layout, budget, written_lines, memory_use, build, board, .. }) => {
                 let protocol = PROTOCOL_VERSION + 1;
-                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board })
             }
             reply => reply,
         };
@@ -119,9 +119,9 @@ fn a_render_ends_while_a_lost_card_is_tried() {
 /// Answers of a card of another version.
 fn other_version(command: &Command) -> Option<Reply<'static>> {
     match sound(command)? {
-        Reply::Hello { layout, budget, written_lines, memory_use, build, .. } => {
+        Reply::Hello { layout, budget, written_lines, memory_use, build, board, .. } => {
             let protocol = PROTOCOL_VERSION + 1;
-            Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+            Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board })
         }
         reply => Some(reply),
     }
@@ -147,9 +147,9 @@ fn a_card_that_fails_its_first_hello_is_lost_beside_another_and_told_once() {
 macro_rules! small {
     ($($field:ident: $value:expr),+) => {
         |command: &Command| match sound(command)? {
-            Reply::Hello { protocol, layout, budget, written_lines, memory_use, build } => {
+            Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board } => {
                 let budget = Budget { $($field: $value),+, ..budget };
-                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board })
             }
             reply => Some(reply),
         }

@@ -56,6 +56,7 @@ pub(crate) fn sound(command: &Command) -> Option<Reply<'static>> {
             written_lines: 0,
             memory_use: None,
             build: "a card",
+            board: None,
         }),
         Command::EndImage => Some(Reply::ImageAccepted),
         Command::BeginFrame(_) => Some(Reply::FrameAccepted),

@@ -138,9 +138,9 @@ fn keeping(command: &Command) -> Option<Reply<'static>> {
     match command {
         Command::ReadChecksums { first, .. } => Some(Reply::Checksums { first: *first, data: &[0; 8] }),
         command => sound(command).map(|reply| match reply {
-            Reply::Hello { protocol, layout, budget, memory_use, build, .. } => {
+            Reply::Hello { protocol, layout, budget, memory_use, build, board, .. } => {
                 let written_lines = IMAGE_LINES as u32;
-                Reply::Hello { protocol, layout, budget, written_lines, memory_use, build }
+                Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board }
             }
             reply => reply,
         }),
@@ -303,9 +303,9 @@ fn a_card_that_comes_back_with_another_budget_is_told_of() {
     let mut bench = Bench::new(&frame);
     bench.go(&mut Card::new(sound), Duration::from_secs(5)).unwrap();
     let mut smaller = Card::new(|command| match sound(command)? {
-        Reply::Hello { protocol, layout, budget, written_lines, memory_use, build } => {
+        Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board } => {
             let budget = Budget { tile_pixels: 4, ..budget };
-            Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+            Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build, board })
         }
         reply => Some(reply),
     });

@@ -11,7 +11,6 @@ mod port;
 #[expect(unsafe_code, reason = "registers are memory that changes by itself")]
 pub(crate) mod register;
 mod report;
-mod ring;
 #[expect(unsafe_code, reason = "a debugger is called by an instruction of its own")]
 pub(crate) mod semihosting;
 #[expect(unsafe_code, reason = "what the stack leaves behind is read as memory")]

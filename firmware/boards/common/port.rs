@@ -3,10 +3,10 @@
 use core::marker::PhantomData;
 use core::time::Duration;
 
+use photoncard_firmware::serve::Ring;
 use photoncard_shared::link::{Port, PortError};
 
 use super::board::Board;
-use super::ring::Ring;
 
 /// Capacity of the ring of received bytes, far more than the few tile commands that a host sends while a card
 /// computes.

@@ -2,11 +2,11 @@
 //! checked.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::checksum::{ImageChecksum, image_checksum};
+use photoncard_shared::checksum::ImageChecksum;
 use photoncard_shared::image::{HEADER_LINES, Header, HeaderError};
 use photoncard_shared::message::{CHECKSUMS_PER_REPLY, CHUNK_LINES, Fault, FaultCode};
 
-use crate::memory::{CardMemory, Stage};
+use crate::memory::{CardMemory, Stage, outside};
 use crate::scene::SceneImage;
 use crate::self_test::MemoryTester;
 
@@ -67,14 +67,15 @@ impl Loader {
     ///
     /// # Errors
     /// [`FaultCode::Lines`] if `data` does not consist of whole lines, or exceeds the card image. Nothing is
-    /// written then.
+    /// written then. [`FaultCode::Memory`] if the memory's device fails, or the lines are read-only.
     pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
         let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
         let count = u32::try_from(lines.len()).map_err(|_| fault)?;
         let end =
             first.checked_add(count).filter(|&end| end <= self.lines && rest.is_empty()).ok_or(fault)?;
-        memory.write(Structure::Header, LineAddress(first), lines).ok_or(fault)?;
+        let written = memory.write(Structure::Header, LineAddress(first), lines);
+        written.ok_or_else(|| memory.failure().unwrap_or(fault))?;
         Ok(end)
     }
 
@@ -100,7 +101,7 @@ impl Check {
         let known = memory.known_checksum(lines);
         if known.is_none() {
             let count = CHUNK_LINES.min(lines - self.next);
-            self.checksum.update(stored(memory, self.next, count)?);
+            update(&mut self.checksum, memory, self.next, count)?;
             self.next += count;
             if self.next < lines {
                 return Ok(None);
@@ -155,18 +156,35 @@ impl Checksums {
 
     /// Returns the checksum of the next chunk, and whether it is the last one requested. The last chunk in
     /// memory may be shorter than others.
-    pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
+    pub(super) fn step(&mut self, memory: &mut impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
         let begin = self.next.saturating_mul(CHUNK_LINES);
-        let lines = stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;
+        let mut checksum = ImageChecksum::default();
+        update(&mut checksum, memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;
         self.next += 1;
-        Ok((image_checksum(lines), self.next >= self.end))
+        Ok((checksum.value(), self.next >= self.end))
     }
 }
 
-/// Reads `count` lines of the memory from line `first` on.
+/// Adds `count` lines of the memory from line `first` on to a checksum.
 ///
 /// # Errors
-/// [`FaultCode::LineRange`] if some of them are not in the memory.
-fn stored(memory: &impl CardMemory, first: u32, count: u32) -> Result<&[Line], Fault> {
-    memory.stored(LineAddress(first), count).ok_or(Fault { code: FaultCode::LineRange, detail: first })
+/// [`FaultCode::LineRange`] if some of them are not in the memory, [`FaultCode::Memory`] if its device fails.
+fn update(
+    checksum: &mut ImageChecksum,
+    memory: &mut impl CardMemory,
+    first: u32,
+    count: u32,
+) -> Result<(), Fault> {
+    let end = first.saturating_add(count);
+    let mut next = first;
+    while next < end {
+        next += match memory.stored(LineAddress(next), end - next) {
+            Some(lines) if !lines.is_empty() => {
+                checksum.update(lines);
+                lines.len() as u32
+            }
+            _ => return Err(memory.failure().unwrap_or(outside(LineAddress(next)))),
+        };
+    }
+    Ok(())
 }

@@ -11,7 +11,7 @@ mod frame;
 mod load;
 
 use photoncard_shared::budget::MAX_GATHER_RAYS;
-use photoncard_shared::message::{self, Command, Fault, FaultCode, MemoryUse, Reply};
+use photoncard_shared::message::{self, Board, Command, Fault, FaultCode, MemoryUse, Reply};
 use photoncard_shared::transport::Transport;
 
 pub use self::engine::MAX_TILES;
@@ -53,6 +53,18 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
     /// function it reports `None`.
     pub fn measure_memory_by(&mut self, measure: fn() -> MemoryUse) {
         self.engine.measure = Some(measure);
+    }
+
+    /// Sets the board, which [`Reply::Hello`] reports; without one it reports `None`.
+    pub fn run_on(&mut self, board: Board<'static>) {
+        self.engine.board = Some(board.cut());
+    }
+
+    /// Sets the function that reads a counter of processor cycles, such as `DWT->CYCCNT` or `mcycle`. It may
+    /// wrap, but not within one [`Self::work`]. [`Counters::cycles`](photoncard_shared::counters::Counters)
+    /// reports the cycles of the work on a tile.
+    pub fn count_cycles_by(&mut self, cycles: fn() -> u32) {
+        self.engine.cycles = Some(cycles);
     }
 
     /// Returns true while [`Self::work`] can proceed without further bytes from the host.

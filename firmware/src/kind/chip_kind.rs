@@ -59,6 +59,7 @@ pub trait FixedKind:
 
 /// On-chip memory that each technique adds to a chip, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TechniqueMemory {
     /// Deferred reordering: the gather queue, and the tables of what waits in card memory.
     pub reordering: usize,

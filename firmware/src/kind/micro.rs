@@ -24,11 +24,12 @@ pub const MICRO: Budget = Budget {
     waiting_blocks: 8,
 };
 
-/// Kind of the micro chip ([`MICRO`]).
+/// Kind of the micro chip ([`MICRO`]), with `DRAM_MB` megabytes of card memory. `Micro<8>` is for boards with
+/// one chip of PSRAM or a small SDRAM.
 #[derive(Clone, Copy, Debug)]
-pub struct Micro;
+pub struct Micro<const DRAM_MB: u32 = 16>;
 
-impl ChipKind for Micro {
+impl<const DRAM_MB: u32> ChipKind for Micro<DRAM_MB> {
     type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
     type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
@@ -39,13 +40,13 @@ impl ChipKind for Micro {
     type Flights = Entries<{ MICRO.in_flight as usize }>;
 
     fn budget(&self) -> &Budget {
-        &MICRO
+        const { &Self::BUDGET }
     }
 }
 
-impl FixedKind for Micro {
+impl<const DRAM_MB: u32> FixedKind for Micro<DRAM_MB> {
     const KIND: Self = Self;
-    const BUDGET: Budget = MICRO;
+    const BUDGET: Budget = Budget { dram_bytes: (DRAM_MB as u64) << 20, ..MICRO };
     const TECHNIQUE_LIMITS: TechniqueMemory =
         TechniqueMemory { reordering: 30 << 10, irradiance_cache: 48 << 10, importance_sampling: 8704 };
 }

@@ -10,6 +10,7 @@ mod capacity;
 mod chip_kind;
 mod large;
 mod micro;
+mod nano;
 mod reference;
 
 pub use crate::irradiance_cache::MIN_RECORDS;
@@ -18,4 +19,5 @@ pub(crate) use chip_kind::check;
 pub use chip_kind::{ChipKind, FixedKind, TechniqueMemory, cache_bytes, tag_bytes};
 pub use large::{LARGE, Large};
 pub use micro::{MICRO, Micro};
+pub use nano::{NANO, Nano};
 pub use reference::{REFERENCE, Reference, ReferenceCandidates};

@@ -80,11 +80,19 @@ impl<M: CardMemory> CardMemory for Counted<M> {
         self.memory.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
 
     fn known_checksum(&self, lines: u32) -> Option<u64> {
         self.memory.known_checksum(lines)
+    }
+
+    fn resident_lines(&self) -> u32 {
+        self.memory.resident_lines()
+    }
+
+    fn failure(&self) -> Option<Fault> {
+        self.memory.failure()
     }
 }

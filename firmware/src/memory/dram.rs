@@ -67,7 +67,7 @@ impl CardMemory for Lines<'_> {
         u32::try_from(self.0.len()).unwrap_or(u32::MAX)
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         let first = first.0 as usize;
         self.0.get(first..first.checked_add(count as usize)?)
     }
@@ -78,7 +78,7 @@ impl CardMemory for Dram<'_> {
         u32::try_from(self.lines().len()).unwrap_or(u32::MAX)
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         let first = first.0 as usize;
         self.lines().get(first..first.checked_add(count as usize)?)
     }

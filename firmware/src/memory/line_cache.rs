@@ -17,6 +17,7 @@ use crate::sampler::hash;
 /// Mapping from the index of a block to its set in the cache. A block is a part of card memory as long as a
 /// cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SetIndex {
     /// Index modulo the number of sets.
     #[default]
@@ -27,6 +28,7 @@ pub enum SetIndex {
 
 /// Shape of a cache: size, line size, associativity and set index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CacheShape {
     sets: u32,
     ways: u32,
@@ -37,6 +39,7 @@ pub struct CacheShape {
 
 /// Invalid parameter of a [`CacheShape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ShapeError {
     /// The cache line is not a whole number of card memory lines, or larger than
     /// [`CacheShape::MAX_LINE_BYTES`].
@@ -118,6 +121,7 @@ impl CacheShape {
 
 /// Tag of a cache line: the block that it holds.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CacheEntry {
     /// Index of the block in card memory; [`NOTHING`] for an empty cache line.
     block: u32,
@@ -361,11 +365,19 @@ where
         self.memory.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
 
     fn known_checksum(&self, lines: u32) -> Option<u64> {
         self.memory.known_checksum(lines)
+    }
+
+    fn resident_lines(&self) -> u32 {
+        self.memory.resident_lines()
+    }
+
+    fn failure(&self) -> Option<Fault> {
+        self.memory.failure()
     }
 }

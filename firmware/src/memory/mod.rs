@@ -2,12 +2,15 @@
 //!
 //! Each layer between a chip and its DRAM is a [`MemoryPort`] that wraps another: [`LineCaches`] caches
 //! lines, [`Counted`] counts reads. The plain [`Dram`] has no overhead: it borrows slices, and neither copies
-//! nor counts.
+//! nor counts. A board whose processor does not address its memory reads lines into a buffer ([`Unmapped`]),
+//! and a board with a scene in flash reads it in place ([`Resident`]).
 
 mod counted;
 mod dram;
 mod line_cache;
+mod resident;
 mod traffic;
+mod unmapped;
 mod words;
 
 use core::ops::Range;
@@ -18,7 +21,9 @@ pub use line_cache::{CacheEntry, CacheShape, LineCache, LineCaches, SetIndex, Sh
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 pub use photoncard_shared::address::{STAGES, Stage};
 use photoncard_shared::message::{Fault, FaultCode};
+pub use resident::Resident;
 pub use traffic::{Reads, Traffic};
+pub use unmapped::{LineDevice, Unmapped};
 pub use words::{Room, WORDS, WordReader, WordWriter, line_of, words_of};
 
 /// Kinds of work of a chip whose gathers wait in card memory
@@ -96,14 +101,26 @@ pub trait CardMemory: MemoryPort {
     /// Number of lines.
     fn lines(&self) -> u32;
 
-    /// Reads `count` lines from line `first` on, bypassing caches and counters; `None` if some are outside
-    /// the memory.
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
+    /// Reads lines from line `first` on, bypassing caches and counters: `count` of them if the processor
+    /// addresses the memory directly, else as many of them as a buffer holds, at least one. `None` if some of
+    /// the `count` lines are outside the memory, or its device fails.
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
     /// [`image_checksum`](photoncard_shared::checksum::image_checksum) of the first `lines` lines, if it is
     /// known without reading them. An emulated card knows it: its memory is a card image whose checksum the
     /// host computed.
     fn known_checksum(&self, _lines: u32) -> Option<u64> {
+        None
+    }
+
+    /// Number of leading lines that hold a card image when the card is switched on, as a memory in flash does.
+    fn resident_lines(&self) -> u32 {
+        0
+    }
+
+    /// Cause of a write, or of [`Self::stored`], that just gave `None`: the failure of the memory's device, or
+    /// of read-only lines. `None` if lines are outside the memory.
+    fn failure(&self) -> Option<Fault> {
         None
     }
 

@@ -75,7 +75,8 @@ impl MemoryTester {
     /// megabyte and at the end of the memory.
     ///
     /// # Errors
-    /// [`FaultCode::LineRange`] if the memory has fewer lines than it reports.
+    /// [`FaultCode::LineRange`] if the memory has fewer lines than it reports, [`FaultCode::Memory`] if its
+    /// device fails or its lines are read-only.
     pub fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<MemoryTest>, Fault> {
         let progress = &mut self.progress;
         if let (true, Some(pattern)) = (progress.is_end_of_pattern(), progress.pattern.next()) {
@@ -96,26 +97,31 @@ impl MemoryTester {
                 MemoryPattern::ByteLanes => replace_bytes(memory, address),
                 pattern => memory.write(Structure::Header, LineAddress(address), &[line(pattern, address)]),
             }
-            .ok_or_else(|| outside(LineAddress(address)))?;
+            .ok_or_else(|| memory.failure().unwrap_or(outside(LineAddress(address))))?;
         }
         self.progress.written = end;
         Ok(end)
     }
 
     /// Compares the next lines with the pattern. Returns the number of lines compared.
-    fn check(&mut self, memory: &impl CardMemory) -> Result<u32, Fault> {
+    fn check(&mut self, memory: &mut impl CardMemory) -> Result<u32, Fault> {
         let MemoryTest { lines, pattern, checked, .. } = self.progress;
-        let end = checked.saturating_add(STEP_LINES).min(lines);
+        // A buffer may hold fewer lines, so that a step ends anywhere; a report is due at multiples of steps.
+        let end = (checked | (STEP_LINES - 1)).saturating_add(1).min(lines);
         let first = LineAddress(checked);
-        let stored = memory.stored(first, end - checked).ok_or_else(|| outside(first))?;
-        for (address, stored) in (checked..end).zip(stored) {
-            let expected = line(pattern, address);
+        let Some(stored) = memory.stored(first, end - checked) else {
+            return Err(memory.failure().unwrap_or(outside(first)));
+        };
+        let mut next = checked;
+        for stored in stored {
+            let expected = line(pattern, next);
             if stored.0 != expected {
-                add(&mut self.progress.wrong, address, &expected, stored);
+                add(&mut self.progress.wrong, next, &expected, stored);
             }
+            next += 1;
         }
-        self.progress.checked = end;
-        Ok(end)
+        self.progress.checked = next;
+        Ok(next)
     }
 }
 

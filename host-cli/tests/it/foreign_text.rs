@@ -9,7 +9,7 @@ use crate::support::{Outcome, Room, scene, scene_bytes, scene_of, small_render};
 use photoncard_firmware::kind::MICRO;
 use photoncard_shared::checksum::checksum;
 use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
+use photoncard_shared::message::{self, Board, Command, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::Transport;
 use serde_json::{Value, json};
 
@@ -164,6 +164,7 @@ fn serve_hello(mut host: TcpStream, build: &str) {
                 written_lines: 0,
                 memory_use: None,
                 build,
+                board: Some(Board { name: build, serial_number: build, clock_hz: 1 }),
             };
             assert!(!is_hello || transport.send(|bytes| message::encode(&hello, bytes)));
         }

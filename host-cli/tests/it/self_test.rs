@@ -35,7 +35,7 @@ impl CardMemory for StuckLine {
         self.0.len() as u32
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.0.get(first.0 as usize..(first.0 + count) as usize)
     }
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Reason why a card could not execute a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fault {
     /// Kind of fault.
     pub code: FaultCode,
@@ -15,6 +16,7 @@ pub struct Fault {
 
 /// Numbered faults; the numbers are part of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FaultCode {
     /// A payload is not a command; detail: the length of the payload, bytes.
     Message,
@@ -50,11 +52,14 @@ pub enum FaultCode {
     Operands,
     /// The chip's program or its on-chip memory is defective; detail: number of the [`Invariant`].
     Internal,
+    /// The device of card memory failed, or its lines are read-only; detail: index of a line.
+    Memory,
 }
 
 /// Conditions that hold in a correct chip, numbered as in the detail of [`FaultCode::Internal`]. If a
 /// condition is violated, the card sends a fault instead of a wrong picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u32)]
 pub enum Invariant {
     /// Every step of work (pass over pixels, completion of a pixel, gather) must belong to a tile in flight.
@@ -97,6 +102,7 @@ impl Invariant {
 /// Fields of [`FrameParameters`](super::FrameParameters), numbered as in the detail of
 /// [`FaultCode::Parameter`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u32)]
 pub enum Parameter {
     /// Width of the picture.
@@ -252,6 +258,12 @@ impl fmt::Display for Fault {
                 f,
                 "invariant {detail} of the chip is broken: its program or its on-chip memory is at fault"
             ),
+            FaultCode::Memory => {
+                write!(
+                    f,
+                    "line {detail} of the card's memory cannot be read or written: its device failed, or it is read-only"
+                )
+            }
         }
     }
 }

@@ -49,6 +49,7 @@ pub const CHUNK_LINES: u32 = 64;
 
 /// On-chip memory that a card's firmware uses, measured by the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryUse {
     /// Static data, initialised and zeroed, bytes.
     pub static_bytes: u32,
@@ -58,12 +59,41 @@ pub struct MemoryUse {
     pub stack_used: u32,
 }
 
+/// Board of a card, as its firmware states it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Board<'a> {
+    /// Name of the board; empty if it has none. At most [`MAX_NAME_BYTES`] are sent.
+    pub name: &'a str,
+    /// Serial number that tells the board from others of its name; empty if it has none. At most
+    /// [`MAX_NAME_BYTES`] are sent.
+    pub serial_number: &'a str,
+    /// Clock rate of the counter behind [`Counters::cycles`], Hz; 0 if it is unknown.
+    pub clock_hz: u32,
+}
+
+impl Board<'_> {
+    /// The board with names cut to [`MAX_NAME_BYTES`], at a character's border.
+    pub fn cut(&self) -> Self {
+        Self { name: cut(self.name), serial_number: cut(self.serial_number), ..*self }
+    }
+}
+
+/// The longest start of a text that has at most [`MAX_NAME_BYTES`] bytes.
+fn cut(text: &str) -> &str {
+    (0..=MAX_NAME_BYTES).rev().find_map(|end| text.get(..end)).unwrap_or_default()
+}
+
+/// Maximum length of each name in a [`Board`], bytes.
+pub const MAX_NAME_BYTES: usize = 64;
+
 /// Maximum number of checksums in one [`Reply::Checksums`].
 pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
 /// A pinhole camera. The point `(u, v)` of the picture, `u` from 0 to 1 to the right and `v` from 0 to 1
 /// downwards, is seen in the direction `forward + (2 u - 1) right + (1 - 2 v) up`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Camera {
     /// Position of the pinhole, metres.
     pub origin: [f32; 3],
@@ -78,6 +108,7 @@ pub struct Camera {
 /// Parameters of a frame. With the card image, they determine the pixels. Some of them only set the order of
 /// work.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameParameters {
     /// Width of the whole picture, pixels.
     pub width: u32,
@@ -164,6 +195,7 @@ impl FrameParameters {
 /// and have equal weights (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that a pixel
 /// needs no samples of its neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Filter {
     /// A box filter, 1 pixel wide.
     #[default]
@@ -176,6 +208,7 @@ pub enum Filter {
 
 /// Parameters of photon gathers in the caustic map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CausticGather {
     /// Number of neighbours from which the host has chosen the photons' kernel radii, at least 2. A card only
     /// checks it against [`Budget::neighbors`].
@@ -188,6 +221,7 @@ pub struct CausticGather {
 /// Importance sampling of final gather rays. It does not change the expectation of the picture. A gather
 /// point with fewer than eight rays always uses [`Self::Reflection`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sampling {
     /// Directions are chosen in proportion to the BRDF times the cosine.
     #[default]
@@ -203,6 +237,7 @@ pub enum Sampling {
 
 /// Source of the reflected radiance at the end of a gather ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Radiance {
     /// Density estimate from the nearest photons, for all surfaces.
     #[default]
@@ -215,6 +250,7 @@ pub enum Radiance {
 
 /// Time and order of photon gathers. The picture depends on neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Drain {
     /// A gather is done at the end of its ray, without a queue.
     #[default]
@@ -233,6 +269,7 @@ pub enum Drain {
 
 /// A rectangle of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tile {
     /// Number of the tile, which the host chooses.
     pub id: u32,
@@ -255,6 +292,7 @@ impl Tile {
 
 /// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command<'a> {
     /// Begins a session, at any time. The card drops its frame, its tiles and its card image, but keeps the
     /// written lines of memory. The encoding is equal in all versions of the protocol.
@@ -309,6 +347,7 @@ pub enum Command<'a> {
 
 /// Message from a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reply<'a> {
     /// Answer to [`Command::Hello`]. In all versions of the protocol, its first fields are the versions of
     /// protocol and layout ([`hello_versions`]).
@@ -327,6 +366,9 @@ pub enum Reply<'a> {
         /// Name and version of the firmware.
         #[serde(borrow)]
         build: &'a str,
+        /// Board that the firmware runs on. `None` on cards that are no boards, such as emulated ones.
+        #[serde(borrow)]
+        board: Option<Board<'a>>,
     },
     /// Answer to [`Command::ReadChecksums`].
     Checksums {
@@ -382,6 +424,7 @@ pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
 
 /// Protocol and layout version of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Versions {
     /// Version of the protocol.
     pub protocol: u16,

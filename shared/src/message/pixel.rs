@@ -20,6 +20,7 @@ pub const WEIGHT_OF_PROBE: f32 = 0.5;
 
 /// Numbers of samples and of probes in the sums of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SampleCount {
     /// Number of all samples.
     pub samples: u32,
@@ -44,6 +45,7 @@ impl SampleCount {
 
 /// Values of a pixel, averaged over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
     pub radiance: [f32; 3],
@@ -60,6 +62,7 @@ pub struct Pixel {
 
 /// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PixelLayers {
     /// Direct light, W/(sr m^2): visible emission, and light of emitters that shadow rays and the pixel's own
     /// gather rays reach.
@@ -76,6 +79,7 @@ pub struct PixelLayers {
 /// Units of a pixel's sums, stored in the card image
 /// ([`Header::sum_scale`](crate::image::Header::sum_scale)).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SumScale {
     /// Unit of light, W/(sr m^2), a power of two.
     pub radiance: f32,
@@ -85,6 +89,7 @@ pub struct SumScale {
 
 /// Sums of a pixel over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PixelSums {
     /// Sum of radiance, in steps of 2^-40 radiance units, at least 0, saturating. With layers it is the sum
     /// of direct, indirect and caustic light.
@@ -104,6 +109,7 @@ pub struct PixelSums {
 /// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and the number of final
 /// gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LayerSums {
     /// Sum of [`PixelLayers::direct`].
     pub direct: [i64; 3],

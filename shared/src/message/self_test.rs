@@ -11,6 +11,7 @@ pub const WORDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 /// Each pattern is written to the whole memory before it is read back, so that a data cache cannot hide
 /// errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MemoryPattern {
     /// One bit is set, at a different position in each word of a line. Finds data lines that are stuck at 0
     /// or connected.
@@ -52,6 +53,7 @@ impl MemoryPattern {
 
 /// A word whose value differs from the written one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WrongWord {
     /// Index of the 32-bit word, counted from the start of card memory.
     pub index: u32,
@@ -63,6 +65,7 @@ pub struct WrongWord {
 
 /// Summary of the wrong words of one pattern.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WrongWords {
     /// Number of wrong words, at most `u32::MAX`.
     pub count: u32,
@@ -74,6 +77,7 @@ pub struct WrongWords {
 
 /// Progress of a memory test. The test ends with the last line of the last pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryTest {
     /// Number of lines of the memory.
     pub lines: u32,

@@ -13,6 +13,7 @@ const MAX_UNACKNOWLEDGED: u16 = WINDOW as u16 / 2;
 
 /// Numbers of damaged and repeated frames on a link, as counted by one end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineStatistics {
     /// Damaged frames received.
     pub damaged: u64,
@@ -26,6 +27,7 @@ pub struct LineStatistics {
 
 /// Event that a received frame reports to the caller of the transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event {
     /// The frame is complete and belongs to this session.
     Heard,

@@ -4,8 +4,8 @@ use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::frame::MAX_PAYLOAD;
 use photoncard_shared::message::{
-    self, Camera, CausticGather, Command, Drain, Fault, FaultCode, Filter, FrameParameters, MemoryPattern,
-    MemoryTest, MemoryUse, Radiance, Reply, Sampling, Tile, WrongWord, WrongWords,
+    self, Board, Camera, CausticGather, Command, Drain, Fault, FaultCode, Filter, FrameParameters,
+    MemoryPattern, MemoryTest, MemoryUse, Radiance, Reply, Sampling, Tile, WrongWord, WrongWords,
 };
 
 use super::mutation;
@@ -73,18 +73,20 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
 /// One encoded reply of each kind.
 pub(super) fn replies() -> Vec<Vec<u8>> {
     let data = [0x5a; 400];
-    let hello = |budget, memory_use| Reply::Hello {
+    let hello = |budget, memory_use, board| Reply::Hello {
         protocol: 6,
         layout: 3,
         budget,
         written_lines: 300,
         memory_use,
         build: "firmware 1",
+        board,
     };
     let memory_use = MemoryUse { static_bytes: 107_872, stack_bytes: 16_384, stack_used: 5948 };
+    let board = Board { name: "a board", serial_number: "\u{1b}7", clock_hz: 25_000_000 };
     let replies = [
-        hello(REFERENCE, None),
-        hello(MICRO, Some(memory_use)),
+        hello(REFERENCE, None, None),
+        hello(MICRO, Some(memory_use), Some(board)),
         Reply::Checksums { first: 3, data: &data },
         Reply::ImageAccepted,
         Reply::FrameAccepted,

@@ -86,6 +86,7 @@ impl Sessions {
             written_lines,
             memory_use: None,
             build: "a card",
+            board: None,
         };
         Self {
             replies: [false, true].map(|layers| sound_replies(hello(LINES), layers)),

@@ -1,12 +1,8 @@
 //! Parts of boards that need no hardware: the ring buffer between a UART's interrupt and the port, and the
 //! sizes in docs/bring-up.md.
 
-#[path = "../../../firmware/boards/common/ring.rs"]
-mod ring;
-
 use photoncard_firmware::kind::MICRO;
-
-use self::ring::Ring;
+use photoncard_firmware::serve::Ring;
 
 /// docs/bring-up.md states the sizes of the micro chip's budget.
 #[test]

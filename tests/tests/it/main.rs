@@ -30,6 +30,7 @@ mod memory;
 mod nearest_photons;
 mod normal_maps;
 mod operations;
+mod own_cards;
 mod passes;
 mod penumbra;
 mod photons_for;

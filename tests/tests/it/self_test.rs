@@ -124,6 +124,7 @@ impl Chip {
                 written_lines: 0,
                 memory_use: None,
                 build: "a chip",
+                board: None,
             }),
             Command::Compute { operands } => {
                 let numbers: Vec<f32> =

@@ -137,7 +137,7 @@ impl CardMemory for DefectiveMemory {
         LINES
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.shown.get(first.0 as usize..(first.0 + count) as usize)
     }
 
@@ -290,7 +290,7 @@ fn a_memory_without_its_lines_is_a_fault() {
             self.1
         }
 
-        fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
             self.0.get(first.0 as usize..(first.0 + count) as usize)
         }
     }

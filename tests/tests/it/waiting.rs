@@ -141,7 +141,7 @@ fn tiles_of_film(tiles: &[Tile], parts: &[(u32, RenderedTile)], frame: &FramePar
 
 /// Counters without those of the queue.
 fn work_of(counters: &Counters) -> Counters {
-    Counters { drains: 0, most_waiting: 0, ..*counters }
+    Counters { drains: 0, most_waiting: 0, cycles: 0, ..*counters }
 }
 
 proptest! {

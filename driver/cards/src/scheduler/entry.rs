@@ -44,8 +44,8 @@ impl Answer {
     fn agrees_with(&self, other: &Self) -> bool {
         let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
         let work = |answer: &Self| {
-            // These counters depend on the capacity of the chip's queue.
-            Counters { drains: 0, most_waiting: 0, ..answer.tile.counters }
+            // These counters depend on the chip: the capacity of its queue, and its processor.
+            Counters { drains: 0, most_waiting: 0, cycles: 0, ..answer.tile.counters }
         };
         self.tile.records() == other.tile.records() && (is_kept || work(self) == work(other))
     }

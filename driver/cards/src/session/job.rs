@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use photoncard_picture::sink::FinishedTile;
-use photoncard_shared::message::{Fault, FrameParameters, MemoryTest, Tile};
+use photoncard_shared::message::{Board, Fault, FrameParameters, MemoryTest, Tile};
 
 use super::{PixelLimits, Upload};
 
@@ -34,6 +34,24 @@ pub enum Restart {
     NewWork,
     /// The card was reset or silent, or its link was closed. Its tiles are returned as events.
     Lost,
+}
+
+/// Board of a card, in the words of its firmware: arbitrary text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BoardInfo {
+    /// Name of the board; may be empty.
+    pub name: String,
+    /// Serial number of the board; may be empty.
+    pub serial_number: String,
+    /// Clock rate of its counter of cycles, Hz; 0 if unknown.
+    pub clock_hz: u32,
+}
+
+impl From<Board<'_>> for BoardInfo {
+    fn from(board: Board) -> Self {
+        let [name, serial_number] = [board.name, board.serial_number].map(str::to_owned);
+        Self { name, serial_number, clock_hz: board.clock_hz }
+    }
 }
 
 /// Event that a session reports.

@@ -18,7 +18,7 @@ mod upload;
 
 pub use channel::LinkBytes;
 pub use error::SessionError;
-pub use job::{Assignment, Event, Job, Restart};
+pub use job::{Assignment, BoardInfo, Event, Job, Restart};
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
 pub use upload::changed_runs;
@@ -49,6 +49,7 @@ pub struct Session {
     budget: Option<Budget>,
     build: String,
     memory_use: Option<MemoryUse>,
+    board: Option<BoardInfo>,
     job: Option<Job>,
     comparison: Comparison,
     /// Checksum of the card image that the card is assumed to hold.
@@ -82,6 +83,7 @@ impl Session {
             budget: None,
             build: String::new(),
             memory_use: None,
+            board: None,
             job: None,
             comparison: Comparison::default(),
             assumed: None,
@@ -115,6 +117,11 @@ impl Session {
     /// On-chip memory of the card's firmware; `None` before its hello, or if the card does not measure it.
     pub fn memory_use(&self) -> Option<MemoryUse> {
         self.memory_use
+    }
+
+    /// Board of the card; `None` before its hello, or if the card is no board.
+    pub fn board(&self) -> Option<&BoardInfo> {
+        self.board.as_ref()
     }
 
     /// Declares that the card's memory holds the card image with this checksum. The next load omits the lines

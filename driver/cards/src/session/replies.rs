@@ -4,7 +4,7 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Fault, FaultCode, Reply};
 
 use super::error::check_budget;
-use super::job::State;
+use super::job::{BoardInfo, State};
 use super::upload::Comparison;
 use super::{Event, Session, SessionError};
 
@@ -18,9 +18,10 @@ impl Session {
             return Ok(());
         }
         match (self.state, *reply) {
-            (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
+            (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, board, .. }) => {
                 build.clone_into(&mut self.build);
                 self.memory_use = memory_use;
+                self.board = board.map(BoardInfo::from);
                 self.greet(budget, written_lines)?;
                 self.comparison = Comparison::new(written_lines);
                 if self.job.is_some() {

@@ -375,7 +375,7 @@ impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: us
 #[cfg(test)]
 mod tests {
     use photoncard_firmware::card::sram_bytes;
-    use photoncard_firmware::kind::{FixedKind, Large, Micro};
+    use photoncard_firmware::kind::{FixedKind, Large, Micro, Nano};
     use proptest::prelude::{ProptestConfig, any, prop, prop_assert, proptest};
 
     use super::*;
@@ -397,6 +397,7 @@ mod tests {
         check_sizes::<Reference>();
         check_sizes::<Large>();
         check_sizes::<Micro>();
+        check_sizes::<Nano>();
         assert_eq!(read(json!({})), Ok(Emulated::like::<Reference>()));
         let names = RANGES.map(|(name, _)| name);
         let fields = Emulated::like::<Reference>().to_json();

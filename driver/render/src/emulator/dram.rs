@@ -208,7 +208,7 @@ impl CardMemory for EmulatedDram<'_> {
         self.limit
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         let end = first.0.checked_add(count)?;
         self.all().get(first.0 as usize..end as usize)
     }

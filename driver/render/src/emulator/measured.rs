@@ -59,7 +59,7 @@ impl CardMemory for Measured<'_> {
         self.0.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.0.stored(first, count)
     }
 

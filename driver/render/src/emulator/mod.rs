@@ -18,7 +18,7 @@ use std::thread::JoinHandle;
 
 use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{
-    self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+    self, ChipKind as _, Large, Micro, Nano, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
 use photoncard_firmware::memory::{CacheEntry, CardMemory};
 use photoncard_firmware::serve::serve;
@@ -50,18 +50,21 @@ pub enum EmulatedKind {
     Large,
     /// Chip with the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
+    /// Chip with the budget [`NANO`](photoncard_firmware::kind::NANO).
+    Nano,
     /// Chip with the capacities in a file.
     File(Emulated),
 }
 
 impl Choice for EmulatedKind {
-    const ALL: &'static [Self] = &[Self::Reference, Self::Large, Self::Micro];
+    const ALL: &'static [Self] = &[Self::Reference, Self::Large, Self::Micro, Self::Nano];
 
     fn name(self) -> &'static str {
         match self {
             Self::Reference => "emulated",
             Self::Large => "emulated-large",
             Self::Micro => "emulated-micro",
+            Self::Nano => "emulated-nano",
             Self::File(_) => "chip",
         }
     }
@@ -71,6 +74,7 @@ impl Choice for EmulatedKind {
             Self::Reference => "The reference chip",
             Self::Large => "The large chip",
             Self::Micro => "The micro chip",
+            Self::Nano => "The nano chip",
             Self::File(_) => "The chip of a file",
         }
     }
@@ -92,11 +96,16 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip, emulated or on a board, with this budget: `reference`, `large`, `micro` or
-    /// `other`. The size of card memory does not matter.
+    /// Name of the kind of chip, emulated or on a board, with this budget: `reference`, `large`, `micro`, `nano`
+    /// or `other`. The size of card memory does not matter.
     pub fn name_of(budget: &Budget) -> &'static str {
         let is = |kind: &Budget| Budget { dram_bytes: kind.dram_bytes, ..*budget } == *kind;
-        let kinds = [(&kind::REFERENCE, "reference"), (&kind::LARGE, "large"), (&kind::MICRO, "micro")];
+        let kinds = [
+            (&kind::REFERENCE, "reference"),
+            (&kind::LARGE, "large"),
+            (&kind::MICRO, "micro"),
+            (&kind::NANO, "nano"),
+        ];
         kinds.into_iter().find(|(kind, _)| is(kind)).map_or("other", |(_, name)| name)
     }
 
@@ -106,6 +115,7 @@ impl EmulatedKind {
             Self::Reference => Emulated::like::<Reference>(),
             Self::Large => Emulated::like::<Large>(),
             Self::Micro => Emulated::like::<Micro>(),
+            Self::Nano => Emulated::like::<Nano>(),
             Self::File(kind) => kind,
         }
     }

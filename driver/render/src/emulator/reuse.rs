@@ -199,7 +199,7 @@ impl<M: CardMemory> CardMemory for Reused<M> {
         self.memory.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
 

@@ -77,7 +77,7 @@ impl<M: CardMemory + MeasuredMemory> CardMemory for TileMeter<M> {
         self.memory.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
 

@@ -84,7 +84,7 @@ impl<M: CardMemory> CardMemory for Traced<M> {
         self.memory.lines()
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.memory.stored(first, count)
     }
 

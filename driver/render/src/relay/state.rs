@@ -361,6 +361,7 @@ impl<'a, L: CardLink> Relay<'a, L> {
             written_lines: written,
             memory_use: None,
             build: &build,
+            board: None,
         });
     }
 

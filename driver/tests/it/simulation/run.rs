@@ -51,7 +51,7 @@ pub(crate) struct Outcome {
 
 /// Counters without those that depend on the tiles that a chip has in flight together.
 pub(crate) fn work(counters: Counters) -> Counters {
-    Counters { drains: 0, most_waiting: 0, ..counters }
+    Counters { drains: 0, most_waiting: 0, cycles: 0, ..counters }
 }
 
 /// Sink that records its tiles.

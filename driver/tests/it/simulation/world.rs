@@ -95,7 +95,7 @@ impl CardMemory for Memory {
         self.lines.len() as u32
     }
 
-    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+    fn stored(&mut self, first: LineAddress, count: u32) -> Option<&[Line]> {
         self.lines.get(first.0 as usize..first.0 as usize + count as usize)
     }
 }

@@ -4,12 +4,12 @@
 mod tests;
 
 use heapless::Deque;
-use photoncard_shared::budget::{Budget, MAX_WAITING_BLOCKS};
+use photoncard_shared::budget::MAX_WAITING_BLOCKS;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, Invariant, MemoryUse, OPERAND_BYTES,
-    PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile, record_bytes,
+    self, Board, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, Invariant, MemoryUse,
+    OPERAND_BYTES, PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
 
@@ -32,6 +32,11 @@ pub(super) struct Engine<K: ChipKind> {
     image: ImageState,
     /// Function that measures on-chip memory; `None` if the board has no such function.
     pub(super) measure: Option<fn() -> MemoryUse>,
+    pub(super) board: Option<Board<'static>>,
+    /// Function that reads a counter of processor cycles; `None` if the board has no such counter.
+    pub(super) cycles: Option<fn() -> u32>,
+    /// Processor cycles of the chip's work since it last ended a tile.
+    spent: u64,
     /// Number of leading lines of card memory that were written since the card was switched on.
     written: u32,
     checksums: Option<Checksums>,
@@ -63,6 +68,9 @@ impl<K: ChipKind> Engine<K> {
             chip,
             image: ImageState::None,
             measure: None,
+            board: None,
+            cycles: None,
+            spent: 0,
             written: 0,
             checksums: None,
             frame: Slot::Empty,
@@ -88,11 +96,8 @@ impl<K: ChipKind> Engine<K> {
         match *command {
             Command::Hello { .. } => {
                 self.forget();
-                Ok(Some(hello(
-                    self.chip.kind().budget(),
-                    self.written,
-                    self.measure.map(|measure| measure()),
-                )))
+                self.written = self.written.max(memory.resident_lines());
+                Ok(Some(self.hello()))
             }
             Command::ReadChecksums { first, count } => {
                 if self.is_at_work() {
@@ -141,6 +146,18 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
+    fn hello(&self) -> Reply<'static> {
+        Reply::Hello {
+            protocol: PROTOCOL_VERSION,
+            layout: LAYOUT_VERSION,
+            budget: *self.chip.kind().budget(),
+            written_lines: self.written,
+            memory_use: self.measure.map(|measure| measure()),
+            build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
+            board: self.board,
+        }
+    }
+
     /// Computes the results of the arithmetic self-test for encoded triples of operands.
     fn compute(&mut self, operands: &[u8]) -> Result<Reply<'_>, Fault> {
         if self.is_at_work() {
@@ -176,6 +193,7 @@ impl<K: ChipKind> Engine<K> {
     fn drop_begun(&mut self) {
         self.chip.clear();
         self.begun = 0;
+        self.spent = 0;
         self.finished = None;
         self.is_flushed = false;
         self.waits = false;
@@ -250,7 +268,12 @@ impl<K: ChipKind> Engine<K> {
             ImageState::Testing(_) => return self.test(memory, transport),
             ImageState::None | ImageState::Loading(_) | ImageState::Ready(_) => {}
         }
+        let start = self.cycles.map(|cycles| cycles());
         let result = self.render(memory, transport);
+        let end = self.cycles.map(|cycles| cycles());
+        if let (Some(start), Some(end)) = (start, end) {
+            self.spent = self.spent.wrapping_add(end.wrapping_sub(start).into());
+        }
         if result.is_err() {
             self.drop_begun();
         }
@@ -290,7 +313,8 @@ impl<K: ChipKind> Engine<K> {
     /// Does the next piece of the chip's work. Sends at most one reply.
     fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
         let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
-        if let Some((tile, counters)) = self.finished.take() {
+        if let Some((tile, mut counters)) = self.finished.take() {
+            counters.cycles = core::mem::take(&mut self.spent);
             send(transport, &Reply::TileDone { tile, counters });
             self.begun = self.begun.checked_sub(1).ok_or(Invariant::Flight.fault())?;
             return Ok(());
@@ -358,17 +382,6 @@ impl<K: ChipKind> Engine<K> {
             send(transport, &Reply::Pixels { tile, first, data: &self.data });
             self.data.clear();
         }
-    }
-}
-
-fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> Reply<'static> {
-    Reply::Hello {
-        protocol: PROTOCOL_VERSION,
-        layout: LAYOUT_VERSION,
-        budget: *budget,
-        written_lines,
-        memory_use,
-        build: concat!("photoncard-firmware ", env!("CARGO_PKG_VERSION")),
     }
 }
 

@@ -53,6 +53,7 @@ fn any_reply(random: &mut Random, data: &[u8]) -> Vec<u8> {
         written_lines: [0, 64, 4096, u32::MAX][random.below(4)],
         memory_use: None,
         build: "any",
+        board: None,
     };
     let reply = match random.below(9) {
         0..3 => hello,

@@ -1,10 +1,17 @@
 //! A port: one end of a byte link.
 
+#[cfg(feature = "embedded-io")]
+mod io;
+
 use core::fmt;
 use core::time::Duration;
 
+#[cfg(feature = "embedded-io")]
+pub use io::IoPort;
+
 /// Permanent failure of a [`Port`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PortError {
     /// The other end is gone.
     Closed,

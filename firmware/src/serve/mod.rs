@@ -1,8 +1,15 @@
 //! Main loop of a card on a port, for boards and for the emulated card.
 
+#[cfg(feature = "embedded-io-async")]
+mod asynchronous;
+mod ring;
+
 use core::time::Duration;
 
+#[cfg(feature = "embedded-io-async")]
+pub use asynchronous::{ServeError, serve_async};
 use photoncard_shared::link::{Port, PortError};
+pub use ring::Ring;
 
 use crate::card::Card;
 use crate::kind::ChipKind;

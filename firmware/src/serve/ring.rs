@@ -2,8 +2,9 @@
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
-/// Ring of `N` bytes; `N` is a power of two.
-pub(crate) struct Ring<const N: usize> {
+/// Ring of `N` bytes between an interrupt handler, which alone puts them, and the program, which alone takes
+/// them. `N` is a power of two.
+pub struct Ring<const N: usize> {
     bytes: [AtomicU8; N],
     /// Number of bytes put so far, modulo the range of `usize`.
     put: AtomicUsize,
@@ -11,24 +12,33 @@ pub(crate) struct Ring<const N: usize> {
     taken: AtomicUsize,
 }
 
+impl<const N: usize> Default for Ring<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<const N: usize> Ring<N> {
     const IS_POWER_OF_TWO: () = assert!(N.is_power_of_two());
 
-    pub(crate) const fn new() -> Self {
+    /// Creates an empty ring, as the initial value of a static.
+    pub const fn new() -> Self {
         let () = Self::IS_POWER_OF_TWO;
         Self { bytes: [const { AtomicU8::new(0) }; N], put: AtomicUsize::new(0), taken: AtomicUsize::new(0) }
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    /// Returns true if the ring holds no byte.
+    pub fn is_empty(&self) -> bool {
         self.put.load(Ordering::Acquire) == self.taken.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn is_full(&self) -> bool {
+    /// Returns true if the ring has no room for a byte.
+    pub fn is_full(&self) -> bool {
         self.put.load(Ordering::Relaxed).wrapping_sub(self.taken.load(Ordering::Acquire)) >= N
     }
 
     /// Puts a byte. Returns false if the ring is full.
-    pub(crate) fn put(&self, byte: u8) -> bool {
+    pub fn put(&self, byte: u8) -> bool {
         let put = self.put.load(Ordering::Relaxed);
         let Some(place) = self.bytes.get(put % N).filter(|_| !self.is_full()) else { return false };
         place.store(byte, Ordering::Relaxed);
@@ -37,7 +47,7 @@ impl<const N: usize> Ring<N> {
     }
 
     /// Takes the oldest byte; `None` if the ring is empty.
-    pub(crate) fn take(&self) -> Option<u8> {
+    pub fn take(&self) -> Option<u8> {
         let taken = self.taken.load(Ordering::Relaxed);
         let byte = self.bytes.get(taken % N).filter(|_| !self.is_empty())?.load(Ordering::Relaxed);
         self.taken.store(taken.wrapping_add(1), Ordering::Release);
