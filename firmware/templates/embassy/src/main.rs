@@ -1,0 +1,48 @@
+//! A card of photoncard as a task of an executor, beside tasks of one's own.
+#![no_std]
+#![no_main]
+
+mod memory;
+mod uart;
+
+use embassy_executor::Spawner;
+use photoncard_firmware::card::Card;
+use photoncard_firmware::kind::Micro;
+use photoncard_firmware::memory::Dram;
+use photoncard_firmware::serve::serve_async;
+use photoncard_shared::message::Board;
+use static_cell::ConstStaticCell;
+
+/// The kind of chip. `Micro<8>` has 8 MB of card memory, `Nano` lives in 64 KB; one's own takes 14 lines, as
+/// `photoncard_firmware/src/kind/nano.rs`.
+type Kind = Micro<16>;
+
+/// The card, a static: 100 KB do not fit a stack. All of its bytes are zero, so that it takes no flash.
+static CARD: ConstStaticCell<Card<Kind, Dram<'static>>> =
+    ConstStaticCell::new(Card::new(Dram::EMPTY));
+
+#[embassy_executor::main(entry = "riscv_rt::entry")]
+async fn main(_spawner: Spawner) {
+    memory::paint_stack();
+    let card = CARD.take();
+    *card.memory() = Dram::new(memory::take_dram());
+    card.measure_memory_by(memory::memory_use);
+    card.count_cycles_by(|| riscv::register::mcycle::read() as u32);
+    card.run_on(Board {
+        name: "virt",
+        serial_number: "",
+        clock_hz: 0,
+    });
+    let (mut reader, mut writer) = uart::start();
+    loop {
+        // A UART has no end: what it returns is a failure of its device, and the host begins anew.
+        serve_async(card, &mut reader, &mut writer).await;
+    }
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}
