@@ -1,5 +1,5 @@
-//! Measure of a chip's use of its stack. The stack is filled with a pattern at the start; words that no longer
-//! hold the pattern were used.
+//! Measure of a chip's use of its stack. The stack is filled with a pattern at the start; words that no
+//! longer hold the pattern were used.
 //!
 //! A board calls [`paint`] first, before interrupts are enabled, and passes [`used`] to its host in
 //! [`MemoryUse`](photoncard_shared::message::MemoryUse).

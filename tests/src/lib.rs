@@ -1,6 +1,11 @@
 //! Helpers of integration tests: small scenes, renders of them, and a card on a link.
 #![forbid(unsafe_code)]
 
+/// The kind of chip in `docs/bring-up.md` compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/bring-up.md")]
+struct BringUp;
+
 pub mod everything;
 pub mod fuzz;
 pub mod hostile;

@@ -472,13 +472,13 @@ mod tests {
         let path = folder.path().join("my chip.TOML");
         std::fs::write(&path, "[memory]\nin_flight = 1\n").unwrap();
         let own = format!("emulated:{}", path.display());
-        for text in ["emulated", "emulated-large", "emulated-micro", &own] {
+        for text in ["emulated", "emulated-large", "emulated-micro", "emulated-nano", &own] {
             let model: ChipModel = text.parse().unwrap();
             assert_eq!(model.to_string(), text);
         }
         for text in ["", "abacus", "emulated:2", "emulated-micro:chip.toml", "serial:chip.toml"] {
             let said = text.parse::<ChipModel>().unwrap_err();
-            assert!(said.contains("emulated-micro, or emulated:CHIP.toml"), "{said}");
+            assert!(said.contains("emulated-nano, or emulated:CHIP.toml"), "{said}");
         }
     }
 

@@ -113,13 +113,13 @@ pub trait CardMemory: MemoryPort {
         None
     }
 
-    /// Number of leading lines that hold a card image when the card is switched on, as a memory in flash does.
+    /// Number of leading lines that hold a card image when the card is switched on, as lines in flash do.
     fn resident_lines(&self) -> u32 {
         0
     }
 
-    /// Cause of a write, or of [`Self::stored`], that just gave `None`: the failure of the memory's device, or
-    /// of read-only lines. `None` if lines are outside the memory.
+    /// Cause of a write, or of [`Self::stored`], that just gave `None`: the failure of the memory's device,
+    /// or read-only lines. `None` if lines are outside the memory.
     fn failure(&self) -> Option<Fault> {
         None
     }

@@ -113,9 +113,12 @@ fn card_list_gives_an_address_for_every_serial_port() {
 
 #[test]
 fn card_info_prints_the_budget_of_a_card() {
-    for (card, dram) in
-        [("emulated", 536_870_912), ("emulated-large", 536_870_912), ("emulated-micro:2", 16_777_216)]
-    {
+    for (card, dram) in [
+        ("emulated", 536_870_912),
+        ("emulated-large", 536_870_912),
+        ("emulated-micro:2", 16_777_216),
+        ("emulated-nano", 1_048_576),
+    ] {
         let outcome = Room::new().run(&["card", "info", "--card", card]);
         assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
         for word in [

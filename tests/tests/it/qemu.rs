@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -47,20 +48,31 @@ fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
 }
 
 impl Machine {
-    /// Starts a machine, and waits until its card is ready. Also returns the address of its UART.
+    /// Starts a machine with a board image, and waits until its card is ready. Also returns the address of
+    /// its UART.
     fn start(name: &str) -> (Self, CardAddress) {
-        let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("qemu.sh"))
-            .args([name, "pty"])
+        Self::run(name, "qemu.sh", "pty", false)
+    }
+
+    /// Starts a machine with a card made from a template, which says nothing, and waits for its pty.
+    fn start_template(name: &str) -> (Self, CardAddress) {
+        Self::run(name, "template.sh", "run", true)
+    }
+
+    fn run(name: &str, script: &str, argument: &str, is_mute: bool) -> (Self, CardAddress) {
+        let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(script))
+            .args([name, argument])
+            .process_group(0)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .expect("tests/qemu.sh starts");
+            .expect("the script starts");
         let (sender, lines) = channel();
         forward(process.stdout.take().expect("it is piped"), sender.clone());
         forward(process.stderr.take().expect("it is piped"), sender);
         let mut machine = Self { process, lines };
         let start = Instant::now();
-        let (mut address, mut is_ready) = (None, false);
+        let (mut address, mut is_ready) = (None, is_mute);
         while address.is_none() || !is_ready {
             let line = machine.next_line(name, START.saturating_sub(start.elapsed()));
             is_ready |= line == "ready";
@@ -88,8 +100,9 @@ impl Machine {
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        // The process may have ended already.
-        let _ = self.process.kill();
+        // The process may have ended already. A script that waits for QEMU ends with it.
+        let group = rustix::process::Pid::from_child(&self.process);
+        let _ = rustix::process::kill_process_group(group, rustix::process::Signal::TERM);
         let _ = self.process.wait();
     }
 }
@@ -261,6 +274,44 @@ fn check_page(row: &str, name: &str, measured: u32) {
         stated.abs_diff(measured) <= measured / 10,
         "docs/bring-up.md states {stated} for {row} of {name}; write {measured}"
     );
+}
+
+/// Renders with a card in a crate of its own, made from a template by the commands of its README.md, without
+/// and with a link that fails.
+fn renders_from_a_template(name: &str) {
+    if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
+        return skip(&format!("{name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
+    }
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
+    let scene = gltf::load(&path).expect("a shipped scene loads");
+    let (machine, address) = Machine::start_template(name);
+    let info = card_info(&address).expect("the card answers");
+    assert!(info.board.is_some_and(|board| !board.name.is_empty()));
+    for faults in [None, faults().first().copied()] {
+        let remote = settings().with(|s| {
+            s.cards.addresses = vec![address.clone()];
+            s.cards.faults = faults;
+        });
+        let expected = render_or_panic(&scene, &settings()).film;
+        let film = render_or_panic(&scene, &remote).film;
+        for (index, (sums, expected)) in film.sums().zip(expected.sums()).enumerate() {
+            assert_eq!(sums, expected, "{name}, pixel {index}");
+        }
+    }
+    let memory = card_info(&address).expect("the card answers").memory_use.expect("it measures its memory");
+    say(&format!("{name}: {memory:?}"));
+    assert!(0 < memory.stack_used && memory.stack_used < memory.stack_bytes);
+    drop(machine);
+}
+
+#[test]
+fn a_card_from_the_polled_template_renders_the_picture_of_the_emulated_card() {
+    renders_from_a_template("polled");
+}
+
+#[test]
+fn a_card_from_the_embassy_template_renders_the_picture_of_the_emulated_card() {
+    renders_from_a_template("embassy");
 }
 
 #[test]

@@ -96,8 +96,8 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip, emulated or on a board, with this budget: `reference`, `large`, `micro`, `nano`
-    /// or `other`. The size of card memory does not matter.
+    /// Name of the kind of chip, emulated or on a board, with this budget: `reference`, `large`, `micro`,
+    /// `nano` or `other`. The size of card memory does not matter.
     pub fn name_of(budget: &Budget) -> &'static str {
         let is = |kind: &Budget| Budget { dram_bytes: kind.dram_bytes, ..*budget } == *kind;
         let kinds = [
