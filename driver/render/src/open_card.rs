@@ -144,7 +144,7 @@ impl Port for OpenCard {
 
 pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
     match address {
-        RemoteAddress::Serial { path, baud } => open_serial(path, *baud).map(boxed),
+        RemoteAddress::Serial { path, baud, lines } => open_serial(path, *baud, *lines).map(boxed),
         RemoteAddress::Tcp { host, port } => connect_tcp(host, *port).map(boxed),
         RemoteAddress::Unix { path } => connect_unix(path).map(boxed),
     }

@@ -40,6 +40,13 @@ impl LinkError {
         Self::new("open", address, reason, remedy)
     }
 
+    /// Error of a line of a serial port that cannot be set as its address demands.
+    pub(super) fn modem_line(address: impl Display, option: impl Display, error: &io::Error) -> Self {
+        let reason = format!("{option} is not possible: {error}");
+        let remedy = "leave the option out: lines are then raised if the port has them";
+        Self::new("open", address, &reason, remedy)
+    }
+
     /// Error of connecting to a socket.
     pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {

@@ -3,6 +3,7 @@
 mod error;
 mod host_port;
 mod listener;
+mod modem_lines;
 mod remote_address;
 mod serial;
 mod socket;
@@ -16,6 +17,7 @@ mod unsupported;
 pub use error::LinkError;
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
+pub use modem_lines::ModemLines;
 pub use remote_address::RemoteAddress;
 pub use serial::{ListedPort, SerialLink, list_serial_ports, open_serial};
 pub use socket::connect_tcp;

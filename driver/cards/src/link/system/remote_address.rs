@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use super::modem_lines::ModemLines;
 use super::socket::{host_name, tcp_address};
 
 /// Address of a card that is not emulated in this process.
@@ -14,6 +15,8 @@ pub enum RemoteAddress {
         path: PathBuf,
         /// Speed, bit/s.
         baud: u32,
+        /// States of the lines DTR and RTS.
+        lines: ModemLines,
     },
     /// TCP port on which the card listens.
     Tcp {
@@ -38,11 +41,11 @@ const MIN_BAUD: u32 = 4800;
 
 impl RemoteAddress {
     /// Valid forms of an address, for help texts.
-    pub const FORMS: &str = "serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH";
+    pub const FORMS: &str = "serial:PATH[@BAUD][,dtr=on|off][,rts=on|off], tcp:HOST:PORT or unix:PATH";
 
     /// Creates the address of a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
-        Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
+        Self::Serial { path: path.into(), baud: DEFAULT_BAUD, lines: ModemLines::default() }
     }
 
     /// Parses an address. `kind` is the text before the first colon, and `rest` the text after it. Returns
@@ -64,7 +67,7 @@ impl RemoteAddress {
 impl fmt::Display for RemoteAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
+            Self::Serial { path, baud, lines } => write!(f, "serial:{}@{baud}{lines}", path.display()),
             Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
             Self::Unix { path } => write!(f, "unix:{}", path.display()),
         }
@@ -72,21 +75,24 @@ impl fmt::Display for RemoteAddress {
 }
 
 fn serial(text: &str) -> Result<RemoteAddress, String> {
-    // The path itself may contain an @.
-    let (path, baud) = match text.rsplit_once('@') {
+    // Folders of the path may contain a comma, and the path an @.
+    let name = text.rfind('/').map_or(0, |slash| slash + 1);
+    let (port, options) = match text[name..].find(',') {
+        Some(comma) => (&text[..name + comma], Some(&text[name + comma + 1..])),
+        None => (text, None),
+    };
+    let (path, baud) = match port.rsplit_once('@') {
         Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
-        _ => (text, None),
+        _ => (port, None),
     };
     if path.is_empty() {
         return Err(
             "a card on a serial port is serial:PATH[@BAUD], such as serial:/dev/ttyUSB0@115200".into()
         );
     }
-    let baud = match baud {
-        None => DEFAULT_BAUD,
-        Some(baud) => speed(baud)?,
-    };
-    Ok(RemoteAddress::Serial { path: path.into(), baud })
+    let baud = baud.map_or(Ok(DEFAULT_BAUD), speed)?;
+    let lines = options.map_or(Ok(ModemLines::default()), str::parse)?;
+    Ok(RemoteAddress::Serial { path: path.into(), baud, lines })
 }
 
 fn speed(text: &str) -> Result<u32, String> {
