@@ -36,7 +36,7 @@ fn partial_bytes(room: &Room) -> u64 {
 }
 
 /// Starts a render, and waits until its partial file has `tiles` tiles.
-fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
+pub(crate) fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     let cornell = shipped("cornell.gltf");
     let mut command = room.command();
     let mut host = command.args(arguments(&cornell, options)).stderr(Stdio::piped()).spawn().unwrap();
@@ -58,7 +58,7 @@ fn hang_up() -> &'static str {
 }
 
 /// Bytes of the picture of a render that is not interrupted.
-fn expected() -> Vec<u8> {
+pub(crate) fn expected() -> Vec<u8> {
     let room = Room::new();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
@@ -235,10 +235,11 @@ fn a_card_that_freezes_leaves_its_tiles_to_the_other() {
 #[test]
 fn finished_tiles_are_kept_when_all_cards_fail() {
     let expected = expected();
-    for listen in ["tcp:", "pty"] {
+    for (listen, options) in [("tcp:", ""), ("pty", ",wait=0")] {
         let room = Room::new();
         let card = Emulator::start(&room, listen, &[]);
-        let host = begun(&room, &["--card", &card.address, "--stats", "a.json"], 5);
+        let address = format!("{}{options}", card.address);
+        let host = begun(&room, &["--card", &address, "--stats", "a.json"], 5);
         card.end("-KILL");
         let outcome = host.wait_with_output().unwrap();
         let said = String::from_utf8(outcome.stderr).unwrap();

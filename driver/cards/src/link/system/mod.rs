@@ -3,9 +3,9 @@
 mod error;
 mod host_port;
 mod listener;
-mod modem_lines;
 mod remote_address;
 mod serial;
+mod serial_options;
 mod socket;
 mod stream;
 
@@ -17,9 +17,9 @@ mod unsupported;
 pub use error::LinkError;
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
-pub use modem_lines::ModemLines;
 pub use remote_address::RemoteAddress;
 pub use serial::{ListedPort, SerialLink, list_serial_ports, open_serial};
+pub use serial_options::SerialOptions;
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;

@@ -11,7 +11,7 @@ use serialport::{
 };
 
 use super::LinkError;
-use super::modem_lines::{Line, ModemLines};
+use super::serial_options::{Line, SerialOptions};
 use super::stream::moved;
 #[cfg(windows)]
 use serialport::COMPort as SystemPort;
@@ -36,18 +36,18 @@ pub struct SerialLink {
 }
 
 /// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow
-/// control. Sets DTR and RTS, which a port without such lines ignores unless `lines` states them. Stale bytes
+/// control. Sets DTR and RTS, which a port without such lines ignores unless `options` states them. Stale bytes
 /// of an earlier session are dropped. The port is locked against other photoncard processes.
 ///
 /// # Errors
 /// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed
-/// or a state of `lines`.
-pub fn open_serial(path: &Path, baud: u32, lines: ModemLines) -> Result<SerialLink, LinkError> {
+/// or a state of the lines.
+pub fn open_serial(path: &Path, baud: u32, options: SerialOptions) -> Result<SerialLink, LinkError> {
     let address = format!("serial:{}", path.display());
     let mut link = open(path, baud).map_err(|error| LinkError::open(&address, &error))?;
     // A board may send as soon as DTR is raised: bytes from before are dropped by now.
-    lines
-        .set(|line, is_raised| link.set_line(line, is_raised))
+    options
+        .set_lines(|line, is_raised| link.set_line(line, is_raised))
         .map_err(|(option, error)| LinkError::modem_line(&address, option, &error))?;
     begin(&mut link).map_err(|_| LinkError::open(&address, &io::Error::other("the device failed")))?;
     Ok(link)

@@ -1,20 +1,24 @@
-//! States of the lines DTR and RTS of a serial port.
+//! Options of a serial port's address: states of the lines DTR and RTS, and the wait for an unplugged board.
 
 use std::fmt;
 use std::io;
 use std::str::FromStr;
+use std::time::Duration;
 
-/// States of the lines DTR and RTS of a serial port while it is open.
+/// Options of a serial port.
 ///
-/// By default both are raised: a board with USB CDC may send nothing while DTR is low, and Windows leaves it
-/// low. Some boards are held in reset by RTS, or started in their boot loader by DTR: the other line being
-/// raised as well is neutral on all known ones.
+/// By default DTR and RTS are raised while the port is open: a board with USB CDC may send nothing while DTR
+/// is low, and Windows leaves it low. Boards that one of the lines alone resets, or starts in a boot loader,
+/// run while both are raised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ModemLines {
+pub struct SerialOptions {
     /// State of DTR (Data Terminal Ready). `None` for raised, if the port has the line.
     pub dtr: Option<bool>,
     /// State of RTS (Request To Send). `None` for raised, if the port has the line.
     pub rts: Option<bool>,
+    /// Time in seconds for which a render without any other card waits for the card to come back after a
+    /// loss. `None` for 30 s.
+    pub wait: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,16 +27,26 @@ pub(super) enum Line {
     Rts,
 }
 
-const FORM: &str =
-    "use dtr=on, dtr=off, rts=on or rts=off after a comma, such as serial:/dev/ttyACM0@115200,dtr=on,rts=off";
+/// Default of [`SerialOptions::wait`]: the time to find a cable.
+const WAIT: u32 = 30;
+/// Maximum of [`SerialOptions::wait`]: a week.
+const MAX_WAIT: u32 = 7 * 24 * 3600;
 
-impl ModemLines {
+const FORM: &str =
+    "use dtr=on|off, rts=on|off or wait=SECONDS after a comma, such as serial:/dev/ttyACM0@115200,rts=off";
+
+impl SerialOptions {
+    /// Time for which a render without any other card waits for the card to come back after a loss.
+    pub(super) fn wait(self) -> Duration {
+        Duration::from_secs(self.wait.unwrap_or(WAIT).into())
+    }
+
     /// Sets both lines by calls of `set`. Returns the option that was stated and is not possible, with the
     /// error of its call.
     ///
     /// RTS alone resets boards with the automatic reset of the ESP32, DTR alone does not: DTR is raised before
     /// RTS, and lowered after it. A driver of Windows passes RTS on with the next change of DTR only.
-    pub(super) fn set(
+    pub(super) fn set_lines(
         self,
         mut set: impl FnMut(Line, bool) -> io::Result<()>,
     ) -> Result<(), (String, io::Error)> {
@@ -68,39 +82,48 @@ fn option(line: Line, is_raised: bool) -> String {
 }
 
 /// Options of a serial port's address, each after a comma.
-impl fmt::Display for ModemLines {
+impl fmt::Display for SerialOptions {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for line in [Line::Dtr, Line::Rts] {
             self.state(line).map_or(Ok(()), |state| write!(f, ",{}", option(line, state)))?;
         }
-        Ok(())
+        self.wait.map_or(Ok(()), |seconds| write!(f, ",wait={seconds}"))
     }
 }
 
 /// Reads options without the first comma.
-impl FromStr for ModemLines {
+impl FromStr for SerialOptions {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut lines = Self::default();
+        let mut options = Self::default();
         for part in text.split(',') {
             let (name, value) = part.split_once('=').unwrap_or((part, ""));
-            let state = match name {
-                "dtr" => &mut lines.dtr,
-                "rts" => &mut lines.rts,
+            let is_repeated = match name {
+                "dtr" => options.dtr.replace(state(part, value)?).is_some(),
+                "rts" => options.rts.replace(state(part, value)?).is_some(),
+                "wait" => options.wait.replace(seconds(part, value)?).is_some(),
                 _ => return Err(format!("{part:?} is no option of a serial port; {FORM}")),
             };
-            let is_raised = match value {
-                "on" => true,
-                "off" => false,
-                _ => return Err(format!("{part:?} is no state of the line {name}; {FORM}")),
-            };
-            if state.replace(is_raised).is_some() {
+            if is_repeated {
                 return Err(format!("{name} is stated twice in {text:?}; state it once"));
             }
         }
-        Ok(lines)
+        Ok(options)
     }
+}
+
+fn state(part: &str, value: &str) -> Result<bool, String> {
+    match value {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("{part:?} states neither on nor off; {FORM}")),
+    }
+}
+
+fn seconds(part: &str, value: &str) -> Result<u32, String> {
+    let seconds = value.parse().ok().filter(|&seconds| seconds <= MAX_WAIT);
+    seconds.ok_or_else(|| format!("{part:?} has no number of seconds from 0 to {MAX_WAIT}; {FORM}"))
 }
 
 #[cfg(test)]
@@ -110,10 +133,10 @@ mod tests {
     const STATES: [Option<bool>; 3] = [None, Some(false), Some(true)];
 
     /// States (DTR, RTS) that a port goes through whose lines are both `from` when it is opened.
-    fn states(lines: ModemLines, from: bool) -> Vec<(bool, bool)> {
+    fn states(lines: SerialOptions, from: bool) -> Vec<(bool, bool)> {
         let mut states = vec![(from, from)];
         lines
-            .set(|line, is_raised| {
+            .set_lines(|line, is_raised| {
                 let (dtr, rts) = states[states.len() - 1];
                 states.push(if line == Line::Dtr { (is_raised, rts) } else { (dtr, is_raised) });
                 Ok(())
@@ -127,7 +150,7 @@ mod tests {
     fn lines_come_to_their_states_without_a_reset_on_the_way() {
         for (dtr, rts) in STATES.into_iter().flat_map(|dtr| STATES.map(|rts| (dtr, rts))) {
             for from in [false, true] {
-                let states = states(ModemLines { dtr, rts }, from);
+                let states = states(SerialOptions { dtr, rts, wait: None }, from);
                 let wanted = (dtr.unwrap_or(true), rts.unwrap_or(true));
                 assert_eq!(states.last(), Some(&wanted));
                 let is_reset = |state: &(bool, bool)| *state == (false, true);
@@ -141,11 +164,11 @@ mod tests {
         let lacking = |lacked: Line| {
             move |line: Line, _: bool| if line == lacked { Err(io::ErrorKind::Other.into()) } else { Ok(()) }
         };
-        let stated = ModemLines { dtr: Some(true), rts: None };
-        assert!(ModemLines::default().set(lacking(Line::Dtr)).is_ok());
-        assert!(stated.set(lacking(Line::Rts)).is_ok());
-        assert_eq!(stated.set(lacking(Line::Dtr)).unwrap_err().0, "dtr=on");
-        let low = ModemLines { dtr: None, rts: Some(false) };
-        assert_eq!(low.set(lacking(Line::Rts)).unwrap_err().0, "rts=off");
+        let stated = SerialOptions { dtr: Some(true), ..SerialOptions::default() };
+        assert!(SerialOptions::default().set_lines(lacking(Line::Dtr)).is_ok());
+        assert!(stated.set_lines(lacking(Line::Rts)).is_ok());
+        assert_eq!(stated.set_lines(lacking(Line::Dtr)).unwrap_err().0, "dtr=on");
+        let low = SerialOptions { rts: Some(false), ..SerialOptions::default() };
+        assert_eq!(low.set_lines(lacking(Line::Rts)).unwrap_err().0, "rts=off");
     }
 }
