@@ -192,12 +192,14 @@ pub(super) fn exchange(
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
+/// Function that waits until all tiles are done, for at most the given time, and returns whether they are. It
+/// may end the render with the error of the last attempt to reconnect, if there was one.
+type WaitForEnd<'a> = &'a dyn Fn(Duration, &mut Option<LinkError>) -> Result<bool, RenderError>;
+
 /// Tries repeatedly to reconnect to a card. Returns the port, or `None` as soon as all tiles are done.
-/// `wait_for_end` waits until all tiles are done, for at most the given time, and returns whether they are. It
-/// may end the render with the error of the last attempt, if there was one.
 pub(super) fn reopen(
     address: &RemoteAddress,
-    wait_for_end: &dyn Fn(Duration, &mut Option<LinkError>) -> Result<bool, RenderError>,
+    wait_for_end: WaitForEnd,
 ) -> Result<Option<BoxedPort>, RenderError> {
     let mut last = None;
     // The first attempt also follows a pause: a peer that closes every new link must not be contacted in a

@@ -9,9 +9,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::resume::{begun, expected};
 use crate::support::board::{BOARD, Board, Change, Way};
-use crate::support::{Emulator, Outcome, Room};
+use crate::support::{Emulator, Outcome, Room, shipped, small_render};
 
 /// Bytes of the card image whose checksum a card is asked for.
 const CHUNK_BYTES: u64 = 64 * 64;
@@ -60,7 +59,7 @@ fn saying_first(said: Vec<u8>) -> Change {
     to_host(move |bytes| [said.take().unwrap_or_default(), bytes].concat())
 }
 
-// b14ckyy/Kite-GC pull 33 and serialport/serialport-rs pull 239: a board with USB CDC says nothing while DTR is
+// b14ckyy/Kite-GC pull 33 and serialport/serialport-rs pull 239: boards with USB CDC say nothing while DTR is
 // low, and ports without such lines must work as well.
 #[test]
 fn a_port_without_lines_is_used_unless_an_option_states_one() {
@@ -191,6 +190,33 @@ impl Drop for Ping {
     }
 }
 
+/// Options of a picture of 36 tiles that takes about a second.
+const PICTURE: [&str; 7] =
+    ["--size=96x96", "--tile=16", "--photons=2000", "--gather-rays=20", "--neighbors=50", "-o", "a.exr"];
+/// Size of a finished tile in the partial file, bytes.
+const TILE_BYTES: u64 = 8 + 24 + 60 * 256 + 4;
+
+/// Bytes of the picture that an emulated card renders in the command's process.
+fn expected() -> Vec<u8> {
+    let room = Room::new();
+    room.rendered(&shipped("cornell.gltf"), &[&PICTURE[..], &["--quiet", "--card=emulated:1"]].concat());
+    room.read("a.exr")
+}
+
+/// Starts a render on a card, and waits until some of its tiles are kept.
+fn begun(room: &Room, card: &str) -> Child {
+    let cornell = shipped("cornell.gltf");
+    let options = [&PICTURE[..], &["--stats", "a.json", "--card", card]].concat();
+    let mut command = room.command();
+    let mut host = command.args(small_render(&cornell, &options)).stderr(Stdio::piped()).spawn().unwrap();
+    let kept = || std::fs::metadata(room.path("a.exr.partial")).map_or(0, |found| found.len());
+    while kept() < 3 * TILE_BYTES {
+        assert_eq!(host.try_wait().unwrap(), None, "the render has ended");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    host
+}
+
 /// Asserts that a render has succeeded, and returns its notices and statistics.
 fn succeeded(room: &Room, host: Child, picture: &[u8]) -> (String, Value) {
     let outcome = host.wait_with_output().unwrap();
@@ -210,12 +236,12 @@ fn bytes_that_an_overrun_loses_are_sent_again() {
     let lossy = move |_, bytes: Vec<u8>| {
         let mut is_kept = || {
             passed += 1;
-            passed % 5003 != 0
+            !passed.is_multiple_of(5003)
         };
         bytes.into_iter().filter(|_| is_kept()).collect()
     };
     let _board = Board::plug_on(&room, Box::new(lossy));
-    let host = begun(&room, &["--card", BOARD, "--stats", "a.json"], 1);
+    let host = begun(&room, BOARD);
     let (said, statistics) = succeeded(&room, host, &picture);
     assert!(!said.contains("gone"), "{said}");
     assert!(statistics["link"]["damaged_frames"].as_u64() > Some(0), "{statistics}");
@@ -230,7 +256,7 @@ fn a_render_goes_on_where_it_was_when_its_board_is_plugged_in_again() {
         let room = Room::new();
         let mut card = Emulator::start(&room, "unix:card", &[]);
         let board = Board::plug(&room);
-        let host = begun(&room, &["--card", BOARD, "--stats", "a.json"], 5);
+        let host = begun(&room, BOARD);
         board.unplug();
         if is_reset {
             card.end("-KILL");
@@ -258,7 +284,7 @@ fn a_board_that_stays_away_ends_the_render_with_its_reason() {
     let room = Room::new();
     let _card = Emulator::start(&room, "unix:card", &[]);
     let board = Board::plug(&room);
-    let host = begun(&room, &["--card", "serial:board@115200,wait=1"], 5);
+    let host = begun(&room, "serial:board@115200,wait=1");
     board.unplug();
     let begin = Instant::now();
     let outcome = host.wait_with_output().unwrap();
@@ -274,7 +300,7 @@ fn a_board_that_stays_away_ends_the_render_with_its_reason() {
     ] {
         assert!(said.contains(words), "{words}: {said}");
     }
-    assert_eq!(room.names(), ["a.exr.partial", "card"]);
+    assert_eq!(room.names(), ["a.exr.partial", "a.json", "card"]);
 }
 
 // esp-rs/espflash issue 582: a board of another crystal talks at another bit rate, and only noise comes.

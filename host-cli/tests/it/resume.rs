@@ -36,7 +36,7 @@ fn partial_bytes(room: &Room) -> u64 {
 }
 
 /// Starts a render, and waits until its partial file has `tiles` tiles.
-pub(crate) fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
+fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     let cornell = shipped("cornell.gltf");
     let mut command = room.command();
     let mut host = command.args(arguments(&cornell, options)).stderr(Stdio::piped()).spawn().unwrap();
@@ -58,7 +58,7 @@ fn hang_up() -> &'static str {
 }
 
 /// Bytes of the picture of a render that is not interrupted.
-pub(crate) fn expected() -> Vec<u8> {
+fn expected() -> Vec<u8> {
     let room = Room::new();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);

@@ -256,6 +256,8 @@ mod tests {
         }
     }
 
+    /// pyserial/pyserial issue 345: 0x11 was missing in answers. gauteh/defmt-serial issue 12: `socat` with
+    /// `crnl` translates bytes of frames.
     #[test]
     fn swallowed_and_translated_bytes_are_found_in_many_frames() {
         let bytes = frames(4, 1000);

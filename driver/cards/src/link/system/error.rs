@@ -104,6 +104,14 @@ impl LinkError {
 mod tests {
     use super::*;
 
+    /// esp-rs/espflash issue 103: a port without permission was said not to exist.
+    #[test]
+    fn a_port_without_permission_names_the_group_that_has_it() {
+        let error = LinkError::open("serial:/dev/ttyUSB0", &ErrorKind::PermissionDenied.into());
+        assert!(error.to_string().ends_with("no permission to use the device"), "{error}");
+        assert!(error.remedy.contains("the group that owns it, often `dialout`"), "{}", error.remedy);
+    }
+
     #[test]
     fn links_that_a_system_lacks_are_named_with_one_that_it_has() {
         let lacking = ErrorKind::Unsupported.into();

@@ -36,8 +36,8 @@ pub struct SerialLink {
 }
 
 /// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow
-/// control. Sets DTR and RTS, which a port without such lines ignores unless `options` states them. Stale bytes
-/// of an earlier session are dropped. The port is locked against other photoncard processes.
+/// control. Sets DTR and RTS; a port without such lines is no error unless `options` states them. Stale
+/// bytes of an earlier session are dropped. The port is locked against other photoncard processes.
 ///
 /// # Errors
 /// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed

@@ -44,8 +44,8 @@ impl SerialOptions {
     /// Sets both lines by calls of `set`. Returns the option that was stated and is not possible, with the
     /// error of its call.
     ///
-    /// RTS alone resets boards with the automatic reset of the ESP32, DTR alone does not: DTR is raised before
-    /// RTS, and lowered after it. A driver of Windows passes RTS on with the next change of DTR only.
+    /// RTS alone resets boards with the automatic reset of the ESP32, DTR alone does not: DTR is raised
+    /// before RTS, and lowered after it. A driver of Windows passes RTS on with the next change of DTR only.
     pub(super) fn set_lines(
         self,
         mut set: impl FnMut(Line, bool) -> io::Result<()>,
@@ -56,10 +56,9 @@ impl SerialOptions {
         };
         for &line in order {
             let stated = self.state(line);
-            match (set(line, stated.unwrap_or(true)), stated) {
-                (Err(error), Some(is_raised)) => return Err((option(line, is_raised), error)),
-                // A pseudo terminal and some adapters have no such lines.
-                (Ok(()) | Err(_), _) => {}
+            // A pseudo terminal and some adapters have no such lines.
+            if let (Err(error), Some(is_raised)) = (set(line, stated.unwrap_or(true)), stated) {
+                return Err((option(line, is_raised), error));
             }
         }
         Ok(())
@@ -145,7 +144,8 @@ mod tests {
         states
     }
 
-    /// espressif/esptool issue 137: RTS without DTR holds a board in reset.
+    /// espressif/esptool issue 137: RTS without DTR holds a board in reset. esp-rs/espflash pull 554: Windows
+    /// passes RTS on with the next change of DTR.
     #[test]
     fn lines_come_to_their_states_without_a_reset_on_the_way() {
         for (dtr, rts) in STATES.into_iter().flat_map(|dtr| STATES.map(|rts| (dtr, rts))) {
@@ -153,10 +153,20 @@ mod tests {
                 let states = states(SerialOptions { dtr, rts, wait: None }, from);
                 let wanted = (dtr.unwrap_or(true), rts.unwrap_or(true));
                 assert_eq!(states.last(), Some(&wanted));
+                assert!(is_dtr_last(SerialOptions { dtr, rts, wait: None }));
                 let is_reset = |state: &(bool, bool)| *state == (false, true);
                 assert!(wanted == (false, true) || !states.iter().any(is_reset), "{states:?}");
             }
         }
+    }
+
+    fn is_dtr_last(options: SerialOptions) -> bool {
+        let mut last = Line::Rts;
+        let set = options.set_lines(|line, _| {
+            last = line;
+            Ok(())
+        });
+        set.is_ok() && last == Line::Dtr
     }
 
     #[test]
