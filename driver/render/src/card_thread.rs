@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use photoncard_cards::link::LinkError;
 use photoncard_cards::scheduler::{CardNumber, Standing};
 use photoncard_cards::session::{Job, Restart, SessionError};
 use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::link::PortError;
 
 use super::crew::{Crew, EndOthersOnPanic};
 use super::greeting::GreetedCard;
@@ -72,14 +74,16 @@ impl CardAtWork<'_> {
         if !error.may_pass() {
             self.greeted.session.give_back();
             self.collect()?;
-            crew.lose(number, CardError::Session(error), Standing::GivenUp, self.is_lost)?;
+            crew.lose(number, CardError::Session(error), Standing::GivenUp)?;
             return Ok(false);
         }
         let is_closed = matches!(error, SessionError::Port(_));
         self.greeted.session.restart(Restart::Lost, crew.start.elapsed());
         self.collect()?;
         if !std::mem::replace(&mut self.is_lost, true) {
-            crew.lose(number, CardError::Session(error), Standing::Lost, false)?;
+            crew.lose(number, CardError::Session(error), Standing::Lost)?;
+        } else if !crew.has_hope() {
+            return Err(crew.fail_by(number, CardError::Session(error)));
         }
         if is_closed { self.reopen() } else { Ok(true) }
     }
@@ -87,10 +91,28 @@ impl CardAtWork<'_> {
     /// Reconnects to a remote card whose link was closed. Returns false for an emulated card.
     fn reopen(&mut self) -> Result<bool, RenderError> {
         let Some(address) = self.greeted.card.close() else { return Ok(false) };
-        if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {
+        let wait = |longest, last: &mut Option<LinkError>| {
+            if self.crew.has_hope() {
+                self.crew.wait_for_end(longest)
+            } else {
+                Err(self.give_up(last.take()))
+            }
+        };
+        if let Some(port) = reopen(&address, &wait)? {
             self.greeted.card.go_on_with(port);
         }
         Ok(true)
+    }
+
+    /// Ends the render because the card has not returned. `last` is the error of the last attempt to reopen
+    /// its link, if there was one.
+    fn give_up(&self, last: Option<LinkError>) -> RenderError {
+        let seconds = self.crew.longest_wait().as_secs();
+        let error = match last {
+            Some(source) => CardError::Gone { seconds, source },
+            None => CardError::Session(SessionError::Port(PortError::Closed)),
+        };
+        self.crew.fail_by(self.number, error)
     }
 
     fn tell_progress(&self, loaded: &mut Duration, job: &Job) {

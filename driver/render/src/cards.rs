@@ -3,7 +3,7 @@
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
@@ -178,6 +178,8 @@ impl Cards {
             outputs,
             start: self.start,
             names: &names,
+            waits: self.cards.iter().map(|(_, card)| card.card.wait_for_return()).collect(),
+            alone: Mutex::default(),
             failed: AtomicBool::new(false),
         };
         let crew_of_all = &crew;

@@ -1,6 +1,7 @@
 //! State shared by the threads of all cards.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use photoncard_cards::dispatcher::Dispatcher;
@@ -16,6 +17,10 @@ pub(super) struct Crew<'a> {
     pub(super) start: Instant,
     /// Name of each card in errors.
     pub(super) names: &'a [String],
+    /// Time for which the render waits for each card after it is lost, if no other card is left.
+    pub(super) waits: Vec<Duration>,
+    /// Time since which no card is left; `None` if a card was left when the crew last looked.
+    pub(super) alone: Mutex<Option<Instant>>,
     pub(super) failed: AtomicBool,
 }
 
@@ -70,32 +75,60 @@ impl Crew<'_> {
     }
 
     /// Marks a card as lost or given up (`standing`), and reports it to the observer. Other cards render its
-    /// tiles. `was_lost` is true if an earlier loss was already reported.
+    /// tiles. If none is left, the render waits for lost cards.
     ///
     /// # Errors
-    /// If no other card is left, unless this card was lost before and may return.
+    /// If no other card is left, and no lost one may return.
     pub(super) fn lose(
         &self,
         card: CardNumber,
         error: CardError,
         standing: Standing,
-        was_lost: bool,
     ) -> Result<(), RenderError> {
+        // Ends an earlier wait if a card has come back since.
+        self.has_hope();
         let mut scheduler = self.dispatcher.scheduler();
         scheduler.set_standing(card, standing);
         let is_last = !scheduler.has_living();
-        let crashed_at = scheduler.crashed_at();
         drop(scheduler);
-        let name = self.names[card].clone();
-        if !is_last || was_lost && standing == Standing::Lost {
-            self.outputs.observer.lost(&name, &error);
-            return Ok(());
+        let (name, observer) = (&self.names[card], self.outputs.observer);
+        if !is_last {
+            observer.lost(name, &error);
+        } else if self.has_hope() {
+            observer.waits_for(name, &error, self.longest_wait());
+        } else {
+            return Err(self.fail_by(card, error));
         }
-        Err(self.fail(if crashed_at.is_empty() {
-            RenderError::Card { card: name, source: error }
+        Ok(())
+    }
+
+    /// Returns whether a card is left, or a lost one may still return.
+    pub(super) fn has_hope(&self) -> bool {
+        let mut alone = self.alone.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.dispatcher.scheduler().has_living() {
+            *alone = None;
+            return true;
+        }
+        alone.get_or_insert_with(Instant::now).elapsed() < self.longest_wait()
+    }
+
+    /// Longest time for which the render waits for a lost card, if no card is left.
+    pub(super) fn longest_wait(&self) -> Duration {
+        let scheduler = self.dispatcher.scheduler();
+        let cards = self.waits.iter().enumerate();
+        let lost = cards.filter(|&(card, _)| scheduler.standing(card) == Standing::Lost);
+        lost.map(|(_, wait)| *wait).max().unwrap_or_default()
+    }
+
+    /// Tells the threads of all cards to stop because of the error of the last card. Returns the error of the
+    /// render.
+    pub(super) fn fail_by(&self, card: CardNumber, source: CardError) -> RenderError {
+        let crashed_at = self.dispatcher.scheduler().crashed_at();
+        self.fail(if crashed_at.is_empty() {
+            RenderError::Card { card: self.names[card].clone(), source }
         } else {
             RenderError::Unrendered { tiles: rectangles(&crashed_at) }
-        }))
+        })
     }
 
     /// Tells the threads of all cards to stop because of the error `error` of the scheduler. Returns the

@@ -30,6 +30,18 @@ pub enum CardError {
         "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
+    /// The link was closed, and no other card is left.
+    #[error("it was gone for {seconds} s, and no other card is left: {source}")]
+    #[diagnostic(help(
+        "plug the board in again and go on with `outputs.partial.resume`; `,wait=SECONDS` after the port's path \
+         states a longer wait"
+    ))]
+    Gone {
+        /// Time for which the render waited for the card, seconds.
+        seconds: u64,
+        /// Reason why the link could not be opened again.
+        source: LinkError,
+    },
     /// The card's budget is too small for the picture.
     #[error("{reason}")]
     #[diagnostic(help("{remedy}; or leave the card out"))]

@@ -1,6 +1,7 @@
 //! Observer of a render or of a card's self-test. It can stop the work.
 
 use std::error::Error;
+use std::time::Duration;
 
 use photoncard_picture::sink::TileSink;
 use photoncard_shared::message::Tile;
@@ -43,6 +44,10 @@ pub trait Observer: Sync {
 
     /// Reports that a card was lost or given up. The other cards render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
+
+    /// Reports that a card was lost and no other is left. The render waits for it to come back, for at most
+    /// `_longest`.
+    fn waits_for(&self, _card: &str, _error: &CardError, _longest: Duration) {}
 
     /// Reports that a card rendered a tile, before sinks receive the tile. `_dram_lines` is the number of
     /// lines read from DRAM, if the memory is [modelled](super::RenderSettings::modelled_caches).

@@ -72,6 +72,14 @@ impl OpenCard {
         }
     }
 
+    /// Time for which a render without any other card waits for this card to come back after a loss.
+    pub(super) fn wait_for_return(&self) -> Duration {
+        match &self.connection {
+            Connection::Emulated(_) => Duration::ZERO,
+            Connection::Remote { address, .. } => address.wait_for_return(),
+        }
+    }
+
     /// Sets the reopened port of a remote card after `Self::close`.
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
         if let Connection::Remote { port, .. } = &mut self.connection {
@@ -144,7 +152,7 @@ impl Port for OpenCard {
 
 pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
     match address {
-        RemoteAddress::Serial { path, baud } => open_serial(path, *baud).map(boxed),
+        RemoteAddress::Serial { path, baud, options } => open_serial(path, *baud, *options).map(boxed),
         RemoteAddress::Tcp { host, port } => connect_tcp(host, *port).map(boxed),
         RemoteAddress::Unix { path } => connect_unix(path).map(boxed),
     }
@@ -184,36 +192,45 @@ pub(super) fn exchange(
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
+/// Function that waits until all tiles are done, for at most the given time, and returns whether they are. It
+/// may end the render with the error of the last attempt to reconnect, if there was one.
+type WaitForEnd<'a> = &'a dyn Fn(Duration, &mut Option<LinkError>) -> Result<bool, RenderError>;
+
 /// Tries repeatedly to reconnect to a card. Returns the port, or `None` as soon as all tiles are done.
-/// `wait_for_end` waits until all tiles are done, for at most the given time, and returns whether they are.
 pub(super) fn reopen(
     address: &RemoteAddress,
-    wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
+    wait_for_end: WaitForEnd,
 ) -> Result<Option<BoxedPort>, RenderError> {
+    let mut last = None;
     // The first attempt also follows a pause: a peer that closes every new link must not be contacted in a
     // tight loop.
-    while !wait_for_end(RETRY)? {
+    while !wait_for_end(RETRY, &mut last)? {
         let attempt = try_to_reach(address.clone());
         loop {
             match attempt.recv_timeout(WAIT) {
-                Ok(Some(port)) => return Ok(Some(port)),
-                Err(RecvTimeoutError::Timeout) if wait_for_end(Duration::ZERO)? => return Ok(None),
+                Ok(Ok(port)) => return Ok(Some(port)),
+                Err(RecvTimeoutError::Timeout) if wait_for_end(Duration::ZERO, &mut last)? => {
+                    return Ok(None);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
-                Ok(None) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(Err(error)) => {
+                    last = Some(error);
+                    break;
+                }
+                Err(RecvTimeoutError::Disconnected) => break,
             }
         }
     }
     Ok(None)
 }
 
-/// Tries to connect once, on a separate thread. Sends the port, or `None` on failure, to the returned
-/// receiver. The attempt can take seconds. A render can end meanwhile: it drops the receiver, and the port is
-/// then closed.
-pub(super) fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
+/// Tries to connect once, on a separate thread. Sends the port or the error to the returned receiver. The
+/// attempt can take seconds. A render can end meanwhile: it drops the receiver, and the port is then closed.
+pub(super) fn try_to_reach(address: RemoteAddress) -> Receiver<Result<BoxedPort, LinkError>> {
     let (sender, receiver) = channel();
     let work = move || {
         // The receiver is gone if the render has ended.
-        let _ = sender.send(reach(&address).ok());
+        let _ = sender.send(reach(&address));
     };
     // If no thread can be started, the next attempt follows later.
     let _ = std::thread::Builder::new().name("reopen".into()).spawn(work);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use photoncard_driver::link::{HostPort, ListenAddress, Listener, connect_tcp, open_serial};
+use photoncard_driver::link::{HostPort, ListenAddress, Listener, SerialOptions, connect_tcp, open_serial};
 use photoncard_shared::link::{Port, PortError};
 
 const SOON: Duration = Duration::from_millis(20);
@@ -103,8 +103,8 @@ fn terminals_carry_every_byte() {
     let mut card = HostPort::new(listener, Arc::default(), |_| {});
     for _ in 0..2 {
         assert_eq!(card.read(&mut [0; 8], SOON), Ok(0));
-        let mut host = open_serial(path.as_ref(), 9600).unwrap();
-        let refusal = open_serial(path.as_ref(), 9600).err().unwrap();
+        let mut host = open_serial(path.as_ref(), 9600, SerialOptions::default()).unwrap();
+        let refusal = open_serial(path.as_ref(), 9600, SerialOptions::default()).err().unwrap();
         assert!(refusal.to_string().contains("the device is busy"), "{refusal}");
         assert_eq!(heard(&mut card), b"\0");
         assert_eq!(heard(&mut card), b"\0", "the host ends what another may have left");
@@ -134,7 +134,7 @@ fn terminals_carry_every_byte() {
 fn a_full_serial_line_holds_nobody() {
     let listener = Listener::new(&ListenAddress::Pty).unwrap();
     let path = listener.card_address().strip_prefix("serial:").unwrap().to_owned();
-    let mut host = open_serial(path.as_ref(), 921_600).unwrap();
+    let mut host = open_serial(path.as_ref(), 921_600, SerialOptions::default()).unwrap();
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
         let mut sent = 0;

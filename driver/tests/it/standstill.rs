@@ -7,7 +7,7 @@ use std::time::Duration;
 use photoncard_driver::render::{Integrator, Picture, RenderSettings};
 use photoncard_driver::scene::Camera;
 use photoncard_driver::session::{
-    Assignment, Event, Job, PixelLimits, Restart, Session, SessionError, Upload,
+    Assignment, Event, Job, LineFault, PixelLimits, Restart, Session, SessionError, Upload,
 };
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
@@ -258,6 +258,42 @@ fn a_line_of_bytes_without_messages_is_no_silence() {
             assert!(!is_noise || error.to_string().contains("bytes have come"), "{error}");
         }
     }
+}
+
+/// Runs a session with a sound card whose bytes a line changes, until the session fails.
+fn fail_on_line(mut change: impl FnMut(Vec<u8>) -> Vec<u8>) -> SessionError {
+    let frame = frame();
+    let (mut bench, mut card) = (Bench::new(&frame), Card::new(sound));
+    loop {
+        let answered = card.step(&bench.outgoing());
+        if let Err(error) = bench.take(&change(answered)) {
+            return error;
+        }
+    }
+}
+
+#[test]
+fn a_line_that_damages_all_is_named_with_its_fault() {
+    let error = fail_on_line(|bytes| bytes.iter().map(|byte| byte & 0x7f).collect());
+    assert!(matches!(error, SessionError::Garbled { fault: LineFault::SevenBits, .. }), "{error}");
+    // Every long frame loses a byte: probes are answered, and no hello comes.
+    let error = fail_on_line(|mut bytes| {
+        if bytes.len() > 60 {
+            bytes.remove(40);
+        }
+        bytes
+    });
+    assert!(matches!(error, SessionError::BadLine(LineFault::Damage(4..))), "{error}");
+    assert!(error.may_pass());
+}
+
+#[test]
+fn an_echo_is_no_card() {
+    let frame = frame();
+    let mut bench = Bench::new(&frame);
+    let sent = bench.outgoing();
+    let error = bench.take(&sent).unwrap_err();
+    assert!(matches!(error, SessionError::Echo) && !error.is_wrong() && !error.may_pass(), "{error}");
 }
 
 #[test]

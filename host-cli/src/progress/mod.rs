@@ -155,6 +155,13 @@ impl Observer for Progress {
         self.say(format_args!("photoncard: {card} is {lot}: {error}; any others go on"));
     }
 
+    fn waits_for(&self, card: &str, error: &CardError, longest: Duration) {
+        let seconds = longest.as_secs();
+        self.say(format_args!(
+            "photoncard: {card} is gone: {error}; waiting up to {seconds} s for it to come back"
+        ));
+    }
+
     fn not_shown(&self, error: &dyn Error) {
         self.say(format_args!("photoncard: {error}"));
     }

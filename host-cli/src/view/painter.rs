@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
@@ -239,6 +240,10 @@ impl Observer for Easel<'_> {
 
     fn lost(&self, card: &str, error: &CardError) {
         self.hub.change(|view, now| view.lose_card(card, error.to_string(), now));
+    }
+
+    fn waits_for(&self, card: &str, error: &CardError, _: Duration) {
+        self.lost(card, error);
     }
 
     fn rendered(&self, card: &str, tile: &Tile, dram_lines: Option<u64>) {

@@ -180,6 +180,7 @@ fn unknown_names_are_refused() {
         ("--card", "serial:", ["serial port", "serial:PATH[@BAUD]"]),
         ("--card", "serial:/dev/x@fast", ["no speed", "such as 115200"]),
         ("--card", "serial:/dev/x@1200", ["too slow", "use 4800 or more"]),
+        ("--card", "serial:/dev/x,rts=high", ["\"rts=high\" states neither on nor off", "use dtr=on|off"]),
         ("--card", "tcp:localhost", ["no TCP address", "tcp:HOST:PORT"]),
         ("--card", "unix:", ["Unix socket", "unix:PATH"]),
         ("--card", "abacus", ["no kind of card", "emulated[:CHIPS]"]),

@@ -25,6 +25,7 @@ mod prepared;
 mod provenance;
 mod python;
 mod quality;
+mod reports;
 mod resume;
 mod self_test;
 #[cfg(feature = "study")]

@@ -235,10 +235,11 @@ fn a_card_that_freezes_leaves_its_tiles_to_the_other() {
 #[test]
 fn finished_tiles_are_kept_when_all_cards_fail() {
     let expected = expected();
-    for listen in ["tcp:", "pty"] {
+    for (listen, options) in [("tcp:", ""), ("pty", ",wait=0")] {
         let room = Room::new();
         let card = Emulator::start(&room, listen, &[]);
-        let host = begun(&room, &["--card", &card.address, "--stats", "a.json"], 5);
+        let address = format!("{}{options}", card.address);
+        let host = begun(&room, &["--card", &address, "--stats", "a.json"], 5);
         card.end("-KILL");
         let outcome = host.wait_with_output().unwrap();
         let said = String::from_utf8(outcome.stderr).unwrap();

@@ -15,6 +15,6 @@ pub use fault_injector::{FaultInjector, LineFaults};
 pub use loopback::{LoopbackPort, loopback};
 #[cfg(not(target_family = "wasm"))]
 pub use system::{
-    HostPort, LinkError, ListedPort, ListenAddress, Listener, RemoteAddress, SerialLink, StreamPort,
-    connect_tcp, connect_unix, host_name, list_serial_ports, open_serial,
+    HostPort, LinkError, ListedPort, ListenAddress, Listener, RemoteAddress, SerialLink, SerialOptions,
+    StreamPort, connect_tcp, connect_unix, host_name, list_serial_ports, open_serial,
 };

@@ -7,6 +7,8 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
 use photoncard_shared::message::{Fault, FaultCode, PROTOCOL_VERSION, Tile, Versions};
 
+use super::line_fault::LineFault;
+
 /// Error of a session with a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum SessionError {
@@ -51,20 +53,32 @@ pub enum SessionError {
     Unexpected(&'static str),
     /// Error of a card that was silent for this long.
     #[error("the card has not answered for {} s", .0.as_secs())]
-    #[diagnostic(help("check that the card is powered and its firmware runs"))]
+    #[diagnostic(help(
+        "check that the card is powered, its firmware runs, and its address and bit rate are right: a card answers \
+         nothing that reaches it damaged"
+    ))]
     Silent(Duration),
     /// Error of a line on which bytes arrive but no valid frames.
-    #[error("{bytes} bytes have come from the card in {} s, and no message among them", time.as_secs())]
-    #[diagnostic(help(
-        "another bit rate garbles all (`serial:PATH@BAUD`, as the card's firmware sets it); or the firmware \
-         writes log text on this line, or another device or program is at the address, or the cable is bad"
-    ))]
+    #[error("{bytes} bytes have come from the card in {} s, and no message among them: {fault}", time.as_secs())]
+    #[diagnostic(help("{}", fault.remedy()))]
     Garbled {
         /// Time without a valid frame.
         time: Duration,
         /// Number of bytes since the last valid frame.
         bytes: u64,
+        /// Probable cause.
+        fault: LineFault,
     },
+    /// Error of a line that damages so much that the card comes no further.
+    #[error("the card comes no further on a bad line: {0}")]
+    #[diagnostic(help("{}", .0.remedy()))]
+    BadLine(LineFault),
+    /// Error of a line that returns what the host sends.
+    #[error("the card's answer is an echo of the host's own bytes")]
+    #[diagnostic(help(
+        "a plug or a solder bridge joins TX and RX, or an adapter or console with an echo is at the address"
+    ))]
+    Echo,
     /// Error of a card that answers without progress.
     #[error("the card answers, but has come no further for {} s", .0.as_secs())]
     #[diagnostic(help(
@@ -172,6 +186,9 @@ impl SessionError {
 
     /// Returns whether the card may be retried: it was silent, slow or disconnected, but not wrong.
     pub fn may_pass(&self) -> bool {
-        matches!(self, Self::Silent(_) | Self::Garbled { .. } | Self::Standstill(_) | Self::Port(_))
+        matches!(
+            self,
+            Self::Silent(_) | Self::Garbled { .. } | Self::BadLine(_) | Self::Standstill(_) | Self::Port(_)
+        )
     }
 }

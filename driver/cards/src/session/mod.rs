@@ -9,6 +9,7 @@ mod channel;
 mod clock;
 mod error;
 mod job;
+mod line_fault;
 mod pixel_limits;
 mod relayed;
 mod replies;
@@ -19,6 +20,7 @@ mod upload;
 pub use channel::LinkBytes;
 pub use error::SessionError;
 pub use job::{Assignment, BoardInfo, Event, Job, Restart};
+pub use line_fault::LineFault;
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
 pub use upload::changed_runs;
@@ -35,6 +37,7 @@ use self::channel::Channel;
 use self::clock::{Clock, Failures};
 use self::error::check_versions;
 use self::job::State;
+use self::line_fault::Evidence;
 use self::self_test::Request;
 use self::tiles::TilesInFlight;
 use self::upload::{Comparison, Load};
@@ -72,6 +75,8 @@ pub struct Session {
     is_flushed: bool,
     /// Number of bytes received since the session's last valid frame.
     unheard_bytes: u64,
+    /// Bytes and frames received since the last message.
+    evidence: Evidence,
 }
 
 impl Session {
@@ -99,6 +104,7 @@ impl Session {
             left_suspect: false,
             is_flushed: false,
             unheard_bytes: 0,
+            evidence: Evidence::default(),
         };
         session.restart(Restart::NewWork, now);
         session
@@ -321,11 +327,16 @@ impl Session {
         self.unheard_bytes += bytes.len() as u64;
         while !bytes.is_empty() {
             let passed = self.channel.transport.passed();
+            let damaged = self.channel.transport.statistics().damaged;
             let (taken, event) = self.channel.transport.receive(bytes);
-            bytes = &bytes[taken..];
+            let (taken, rest) = bytes.split_at(taken);
+            bytes = rest;
+            self.evidence.add(taken);
+            self.evidence.add_damaged(self.channel.transport.statistics().damaged - damaged);
             match event {
                 None => {}
                 Some(LineEvent::Heard) => {
+                    self.evidence.add_whole();
                     self.clock.heard(now);
                     self.unheard_bytes = bytes.len() as u64;
                 }
@@ -340,6 +351,11 @@ impl Session {
             while let Some(message) = self.channel.transport.take() {
                 let payload = &mut payload[..message.len()];
                 payload.copy_from_slice(message);
+                if self.state == State::Greeting
+                    && let Some(Command::Hello { .. }) = message::decode(payload)
+                {
+                    return Err(SessionError::Echo);
+                }
                 if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {
                     check_versions(versions)?;
                 }
@@ -348,6 +364,7 @@ impl Session {
             }
             if self.channel.transport.passed() != passed {
                 self.clock.passed(now);
+                self.evidence = Evidence::default();
             }
         }
         Ok(())
@@ -372,7 +389,7 @@ impl Session {
         }
         // A card that holds another host's session of equal number treats the hello as a repeated frame.
         if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
-            self.count_reset()?;
+            self.count_reset().map_err(|error| self.of_line(error))?;
             self.restart(Restart::Lost, now);
             return Ok(());
         }
@@ -384,11 +401,22 @@ impl Session {
         match result {
             Err(SessionError::Standstill(_)) if !self.is_relayed => self.fail()?,
             Err(SessionError::Silent(time)) if self.is_garbled() => {
-                return Err(SessionError::Garbled { time, bytes: self.unheard_bytes });
+                let fault = self.evidence.fault();
+                return Err(SessionError::Garbled { time, bytes: self.unheard_bytes, fault });
             }
             _ => {}
         }
-        result
+        result.map_err(|error| self.of_line(error))
+    }
+
+    /// Returns the error of the line in place of a card's standstill, if the line damages what the card says.
+    fn of_line(&self, error: SessionError) -> SessionError {
+        match error {
+            SessionError::Standstill(_) | SessionError::Failures(_) if self.evidence.is_of_bad_line() => {
+                SessionError::BadLine(self.evidence.fault())
+            }
+            error => error,
+        }
     }
 
     /// Returns whether too many bytes have arrived since the last valid frame: at least `MAX_FRAME`, because
@@ -416,6 +444,7 @@ impl Session {
         self.tiles = TilesInFlight::default();
         self.clock = Clock::new(now);
         self.unheard_bytes = 0;
+        self.evidence = Evidence::default();
         self.state = State::Greeting;
         self.stale_replies = 0;
         self.channel.greet();

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use photoncard_cards::link::HostPort;
+use photoncard_cards::link::{HostPort, LinkError};
 use photoncard_shared::link::{Port, PortError};
 
 use crate::open_card::{BoxedPort, OpenCard, try_to_reach};
@@ -33,7 +33,7 @@ pub trait CardLink: Port {
 pub(super) struct CardPort {
     card: OpenCard,
     /// Attempt to reach a remote card again.
-    attempt: Option<Receiver<Option<BoxedPort>>>,
+    attempt: Option<Receiver<Result<BoxedPort, LinkError>>>,
 }
 
 impl CardPort {
@@ -55,7 +55,7 @@ impl CardLink for CardPort {
         }
         let found = match self.attempt.as_ref()?.try_recv() {
             Err(TryRecvError::Empty) => return None,
-            Ok(found) => found,
+            Ok(found) => found.ok(),
             Err(TryRecvError::Disconnected) => None,
         };
         self.attempt = None;

@@ -1,5 +1,8 @@
 //! Runs the command in a temporary folder, on small scenes.
 
+#[cfg(unix)]
+pub(crate) mod board;
+
 use std::fmt::Write;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};

@@ -40,6 +40,13 @@ impl LinkError {
         Self::new("open", address, reason, remedy)
     }
 
+    /// Error of a line of a serial port that cannot be set as its address demands.
+    pub(super) fn modem_line(address: impl Display, option: impl Display, error: &io::Error) -> Self {
+        let reason = format!("{option} is not possible: {error}");
+        let remedy = "leave the option out: lines are then raised if the port has them";
+        Self::new("open", address, &reason, remedy)
+    }
+
     /// Error of connecting to a socket.
     pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
@@ -96,6 +103,14 @@ impl LinkError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// esp-rs/espflash issue 103: a port without permission was said not to exist.
+    #[test]
+    fn a_port_without_permission_names_the_group_that_has_it() {
+        let error = LinkError::open("serial:/dev/ttyUSB0", &ErrorKind::PermissionDenied.into());
+        assert!(error.to_string().ends_with("no permission to use the device"), "{error}");
+        assert!(error.remedy.contains("the group that owns it, often `dialout`"), "{}", error.remedy);
+    }
 
     #[test]
     fn links_that_a_system_lacks_are_named_with_one_that_it_has() {

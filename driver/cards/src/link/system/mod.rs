@@ -5,6 +5,7 @@ mod host_port;
 mod listener;
 mod remote_address;
 mod serial;
+mod serial_options;
 mod socket;
 mod stream;
 
@@ -18,6 +19,7 @@ pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use remote_address::RemoteAddress;
 pub use serial::{ListedPort, SerialLink, list_serial_ports, open_serial};
+pub use serial_options::SerialOptions;
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;

@@ -2,7 +2,9 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::time::Duration;
 
+use super::serial_options::SerialOptions;
 use super::socket::{host_name, tcp_address};
 
 /// Address of a card that is not emulated in this process.
@@ -14,6 +16,8 @@ pub enum RemoteAddress {
         path: PathBuf,
         /// Speed, bit/s.
         baud: u32,
+        /// Lines of the port, and the wait for an unplugged board.
+        options: SerialOptions,
     },
     /// TCP port on which the card listens.
     Tcp {
@@ -38,11 +42,21 @@ const MIN_BAUD: u32 = 4800;
 
 impl RemoteAddress {
     /// Valid forms of an address, for help texts.
-    pub const FORMS: &str = "serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH";
+    pub const FORMS: &str =
+        "serial:PATH[@BAUD][,dtr=on|off][,rts=on|off][,wait=SECONDS], tcp:HOST:PORT or unix:PATH";
 
     /// Creates the address of a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
-        Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
+        Self::Serial { path: path.into(), baud: DEFAULT_BAUD, options: SerialOptions::default() }
+    }
+
+    /// Time for which a render without any other card waits for this card to come back after a loss. A board
+    /// may be plugged in again. The process behind a socket has ended.
+    pub fn wait_for_return(&self) -> Duration {
+        match self {
+            Self::Serial { options, .. } => options.wait(),
+            Self::Tcp { .. } | Self::Unix { .. } => Duration::ZERO,
+        }
     }
 
     /// Parses an address. `kind` is the text before the first colon, and `rest` the text after it. Returns
@@ -64,7 +78,7 @@ impl RemoteAddress {
 impl fmt::Display for RemoteAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
+            Self::Serial { path, baud, options } => write!(f, "serial:{}@{baud}{options}", path.display()),
             Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
             Self::Unix { path } => write!(f, "unix:{}", path.display()),
         }
@@ -72,21 +86,24 @@ impl fmt::Display for RemoteAddress {
 }
 
 fn serial(text: &str) -> Result<RemoteAddress, String> {
-    // The path itself may contain an @.
-    let (path, baud) = match text.rsplit_once('@') {
+    // Folders of the path may contain a comma, and the path an @.
+    let name = text.rfind('/').map_or(0, |slash| slash + 1);
+    let (port, options) = match text[name..].find(',') {
+        Some(comma) => (&text[..name + comma], Some(&text[name + comma + 1..])),
+        None => (text, None),
+    };
+    let (path, baud) = match port.rsplit_once('@') {
         Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
-        _ => (text, None),
+        _ => (port, None),
     };
     if path.is_empty() {
         return Err(
             "a card on a serial port is serial:PATH[@BAUD], such as serial:/dev/ttyUSB0@115200".into()
         );
     }
-    let baud = match baud {
-        None => DEFAULT_BAUD,
-        Some(baud) => speed(baud)?,
-    };
-    Ok(RemoteAddress::Serial { path: path.into(), baud })
+    let baud = baud.map_or(Ok(DEFAULT_BAUD), speed)?;
+    let options = options.map_or(Ok(SerialOptions::default()), str::parse)?;
+    Ok(RemoteAddress::Serial { path: path.into(), baud, options })
 }
 
 fn speed(text: &str) -> Result<u32, String> {

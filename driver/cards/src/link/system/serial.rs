@@ -11,6 +11,7 @@ use serialport::{
 };
 
 use super::LinkError;
+use super::serial_options::{Line, SerialOptions};
 use super::stream::moved;
 #[cfg(windows)]
 use serialport::COMPort as SystemPort;
@@ -35,13 +36,21 @@ pub struct SerialLink {
 }
 
 /// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow
-/// control. Stale bytes of an earlier session are dropped. The port is locked against other photoncard
-/// processes.
+/// control. Sets DTR and RTS; a port without such lines is no error unless `options` states them. Stale
+/// bytes of an earlier session are dropped. The port is locked against other photoncard processes.
 ///
 /// # Errors
-/// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed.
-pub fn open_serial(path: &Path, baud: u32) -> Result<SerialLink, LinkError> {
-    open(path, baud).map_err(|error| LinkError::open(format_args!("serial:{}", path.display()), &error))
+/// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed
+/// or a state of the lines.
+pub fn open_serial(path: &Path, baud: u32, options: SerialOptions) -> Result<SerialLink, LinkError> {
+    let address = format!("serial:{}", path.display());
+    let mut link = open(path, baud).map_err(|error| LinkError::open(&address, &error))?;
+    // A board may send as soon as DTR is raised: bytes from before are dropped by now.
+    options
+        .set_lines(|line, is_raised| link.set_line(line, is_raised))
+        .map_err(|(option, error)| LinkError::modem_line(&address, option, &error))?;
+    begin(&mut link).map_err(|_| LinkError::open(&address, &io::Error::other("the device failed")))?;
+    Ok(link)
 }
 
 fn open(path: &Path, baud: u32) -> io::Result<SerialLink> {
@@ -59,9 +68,7 @@ fn open(path: &Path, baud: u32) -> io::Result<SerialLink> {
         return Err(ErrorKind::InvalidInput.into());
     }
     port.clear(ClearBuffer::All).map_err(device_error)?;
-    let mut link = SerialLink { port };
-    begin(&mut link).map_err(|_| io::Error::other("the device failed"))?;
-    Ok(link)
+    Ok(SerialLink { port })
 }
 
 /// Opens a port, locks it for this process and sets `O_NONBLOCK`. `serialport` leaves the port blocking, so
@@ -130,6 +137,14 @@ fn begin(port: &mut impl Port) -> Result<(), PortError> {
 }
 
 impl SerialLink {
+    fn set_line(&mut self, line: Line, is_raised: bool) -> io::Result<()> {
+        match line {
+            Line::Dtr => self.port.write_data_terminal_ready(is_raised),
+            Line::Rts => self.port.write_request_to_send(is_raised),
+        }
+        .map_err(io::Error::from)
+    }
+
     /// Sets the timeout of the next read or write.
     fn limit(&mut self, wait: Duration) -> Result<(), PortError> {
         let wait = wait.max(MIN_WAIT);
