@@ -4,7 +4,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// A board: the feature that selects it, its image, its directory under `boards`, and its processor.
+/// A board: the feature that selects it, its image, the directory of its memory map, and its processor.
 struct Board {
     feature: &'static str,
     image: &'static str,
@@ -12,10 +12,17 @@ struct Board {
     architecture: &'static str,
 }
 
-const BOARDS: [Board; 3] = [
+const BOARDS: [Board; 4] = [
     Board {
         feature: "CARGO_FEATURE_BOARD_MPS2_AN386",
         image: "mps2-an386",
+        directory: "mps2_an386",
+        architecture: "arm",
+    },
+    // The same board with another link.
+    Board {
+        feature: "CARGO_FEATURE_BOARD_MPS2_AN386_TCP",
+        image: "mps2-an386-tcp",
         directory: "mps2_an386",
         architecture: "arm",
     },

@@ -11,9 +11,10 @@ tolerance=5
 # Flash that docs/bring-up.md asks of a board, bytes.
 flash=$((512 * 1024))
 
-images=(mps2-an386 virt-riscv32 stm32h747i-disco)
+images=(mps2-an386 mps2-an386-tcp virt-riscv32 stm32h747i-disco)
 declare -A target_of=(
     [mps2-an386]=thumbv7em-none-eabihf
+    [mps2-an386-tcp]=thumbv7em-none-eabihf
     [stm32h747i-disco]=thumbv7em-none-eabihf
     [virt-riscv32]=riscv32imafc-unknown-none-elf
 )

@@ -1,18 +1,19 @@
 #!/usr/bin/env bash
 # Builds the image of a board and starts it in QEMU, until it is interrupted.
-# On a pty, QEMU prints the path to be used as --card serial:PATH. What the image tells of itself goes to standard error, and so does
-# what this script does.
+# On a pty, QEMU prints the path to be used as --card serial:PATH; a card on a network is --card tcp:localhost:PORT, by default 7000. What
+# the image tells of itself goes to standard error, and so does what this script does.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 usage() {
     echo "usage: $0 mps2-an386|virt [pty|unix:PATH]" >&2
+    echo "       $0 mps2-an386-tcp [PORT]" >&2
     exit 2
 }
 
 case "${1:-}" in
-mps2-an386)
-    image=mps2-an386 target=thumbv7em-none-eabihf package=qemu-system-arm
+mps2-an386 | mps2-an386-tcp)
+    image=$1 target=thumbv7em-none-eabihf package=qemu-system-arm
     qemu=(qemu-system-arm -machine mps2-an386)
     ;;
 virt)
@@ -21,9 +22,12 @@ virt)
     ;;
 *) usage ;;
 esac
-case "${2:-pty}" in
-pty) serial=pty ;;
-unix:?*) serial="$2,server=on,wait=off" ;;
+case "${1#mps2-an386}:${2:-}" in
+-tcp:*[!0-9]*) usage ;;
+# Nothing but this machine reaches the card, at the card's port 7000.
+-tcp:*) link=(-serial none -nic "user,model=lan9118,restrict=on,hostfwd=tcp:127.0.0.1:${2:-7000}-:7000") ;;
+*: | *:pty) link=(-serial pty) ;;
+*:unix:?*) link=(-serial "$2,server=on,wait=off") ;;
 *) usage ;;
 esac
 
@@ -49,6 +53,6 @@ echo "$0: building the image of $image, which takes some minutes at first" >&2
 "$cargo" build --quiet --locked -p photoncard-firmware --bin "$image" --features "board-$image" \
     --target "$target" --profile card
 echo "$0: built in $SECONDS s; starting ${qemu[0]}" >&2
-exec "${qemu[@]}" -display none -monitor none -serial "$serial" \
+exec "${qemu[@]}" -display none -monitor none "${link[@]}" \
     -semihosting-config enable=on,target=native \
     -kernel "${CARGO_TARGET_DIR:-target}/$target/card/$image"

@@ -43,6 +43,7 @@
 //! | module | unit | contents |
 //! |---|---|---|
 //! | [`link`] | byte | a port: bytes with a bounded wait |
+//! | [`handover`] | byte | hosts that come and go on one link, of which the card makes one |
 //! | [`stuffing`], [`checksum`] | byte | COBS; CRC-32C and CRC-64/XZ |
 //! | [`frame`] | frame | header, payload, checksum |
 //! | [`transport`] | message | windowed acknowledgement, selective repetition |
@@ -73,6 +74,7 @@ pub mod checksum;
 pub mod counters;
 pub mod embedded;
 pub mod frame;
+pub mod handover;
 pub mod hash;
 pub mod image;
 pub mod layout;

@@ -1,24 +1,29 @@
 //! Interface between a board's hardware and the code that all board images share.
 
-/// Board with one UART, one clock and one processor. Functions have no `self`, because there is one of each.
+use photoncard_shared::link::Port;
+
+/// Board with one link, one clock and one processor. Functions have no `self`, because there is one of each.
 /// Every board image names its board `ThisBoard` in its module `hardware`.
 pub(crate) trait Board {
     const NAME: &'static str;
 
+    /// Clock rate of [`Self::CYCLES`], Hz; 0 if it is unknown.
+    const CLOCK_HZ: u32 = 0;
+
+    /// Function that reads a counter of processor cycles; `None` without such a counter.
+    const CYCLES: Option<fn() -> u32> = None;
+
+    /// On-chip memory of the link, bytes.
+    const LINK_BYTES: usize;
+
     /// Prepares the output of diagnostics; called before anything else.
     fn prepare() {}
 
-    /// Initializes clock and UART, and enables interrupts.
+    /// Initializes clock and link, and enables interrupts.
     fn start();
 
-    /// Takes a received byte from the UART; `None` if none has arrived.
-    fn receive() -> Option<u8>;
-
-    /// Writes a byte to the UART's transmitter. Returns false if the transmitter is full.
-    fn transmit(byte: u8) -> bool;
-
-    /// Enables or disables the receive interrupt of the UART.
-    fn listen(is_interrupt: bool);
+    /// Returns the link to hosts. Called once, after [`Self::start`].
+    fn port() -> impl Port;
 
     /// Returns the time since the start, milliseconds, modulo 2^32.
     fn milliseconds() -> u32;
@@ -26,7 +31,7 @@ pub(crate) trait Board {
     /// Runs `work` with interrupts masked.
     fn masked<R>(work: impl FnOnce() -> R) -> R;
 
-    /// Sleeps until an interrupt is pending, even if it is masked: the interrupt of the UART, or that of the
+    /// Sleeps until an interrupt is pending, even if it is masked: the interrupt of the link, or that of the
     /// clock, which comes within a millisecond.
     fn sleep();
 }

@@ -1,12 +1,12 @@
 //! Code that all board images share, including `main`. A board adds registers, time and interrupts.
 
 mod board;
+pub(crate) mod deadline;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
 mod dram;
 mod measure;
 #[expect(unsafe_code, reason = "a static is handed out once")]
-mod once;
-mod port;
+pub(crate) mod once;
 #[allow(dead_code, reason = "a board may have a crate that knows its registers")]
 #[expect(unsafe_code, reason = "registers are memory that changes by itself")]
 pub(crate) mod register;
@@ -15,6 +15,8 @@ mod report;
 pub(crate) mod semihosting;
 #[expect(unsafe_code, reason = "what the stack leaves behind is read as memory")]
 mod stack;
+#[allow(dead_code, reason = "a board's link may be another than a UART")]
+pub(crate) mod uart;
 
 use core::panic::PanicInfo;
 
@@ -27,13 +29,12 @@ use photoncard_firmware::memory::Dram;
 use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::counters::Counters;
+use photoncard_shared::message;
 #[cfg(target_arch = "riscv32")]
 use riscv_rt::entry;
 
 pub(crate) use self::board::Board;
 use self::once::Once;
-use self::port::BoardPort;
-pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
@@ -41,15 +42,15 @@ use crate::hardware::ThisBoard;
 /// zero: it takes no place in flash.
 static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::EMPTY));
 
-// The card with the budget's caches and stack, and the port's buffer, fit the budget's SRAM.
-const _: () = assert!(sram_bytes::<Micro>() + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
+// The card with the budget's caches and stack, and the link's buffers, fit the budget's SRAM.
+const _: () = assert!(sram_bytes::<Micro>() + ThisBoard::LINK_BYTES <= MICRO.sram_bytes as usize);
 
 #[entry]
 fn main() -> ! {
     run::<ThisBoard>();
 }
 
-/// Serves the card on the board's UART; never returns.
+/// Serves the card on the board's link; never returns.
 fn run<B: Board>() -> ! {
     B::prepare();
     stack::paint();
@@ -68,9 +69,14 @@ fn run<B: Board>() -> ! {
     }
     *card.memory() = Dram::new(lines);
     card.measure_memory_by(report::memory_use);
+    card.run_on(message::Board { name: B::NAME, serial_number: "", clock_hz: B::CLOCK_HZ });
     B::start();
+    if let Some(cycles) = B::CYCLES {
+        card.count_cycles_by(cycles);
+    }
+    let port = B::port();
     semihosting::print(format_args!("ready\n"));
-    let error = serve(card, &mut StackCheck(BoardPort::<B>::new()));
+    let error = serve(card, &mut StackCheck(port));
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
 }
 

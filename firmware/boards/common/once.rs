@@ -4,7 +4,7 @@ use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Value of a static that can be taken once, as a mutable reference.
-pub(super) struct Once<T> {
+pub(crate) struct Once<T> {
     taken: AtomicBool,
     value: UnsafeCell<T>,
 }
@@ -15,13 +15,13 @@ unsafe impl<T: Send> Sync for Once<T> {}
 
 impl<T> Once<T> {
     /// Creates a value that was not taken yet.
-    pub(super) const fn new(value: T) -> Self {
+    pub(crate) const fn new(value: T) -> Self {
         Self { taken: AtomicBool::new(false), value: UnsafeCell::new(value) }
     }
 
     /// Takes the value; `None` if it was taken before.
     #[expect(clippy::mut_from_ref, reason = "it is the only reference: see below")]
-    pub(super) fn take(&'static self) -> Option<&'static mut T> {
+    pub(crate) fn take(&'static self) -> Option<&'static mut T> {
         if self.taken.swap(true, Ordering::Acquire) {
             return None;
         }

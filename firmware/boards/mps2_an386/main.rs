@@ -5,5 +5,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-#[expect(unsafe_code, reason = "registers, and instructions that no function stands for")]
+#[expect(unsafe_code, reason = "registers, and the handler of interrupts")]
 mod hardware;
+#[expect(unsafe_code, reason = "registers, and instructions that no function stands for")]
+mod processor;

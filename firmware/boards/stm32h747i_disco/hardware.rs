@@ -4,14 +4,16 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m::peripheral::{DCB, MPU, NVIC, SCB};
+use cortex_m::peripheral::{DCB, DWT, MPU, NVIC, SCB};
 use cortex_m_rt::{ExceptionFrame, exception};
+use photoncard_shared::link::Port;
 use stm32h7xx_hal::pac::{self, Interrupt, USART1, interrupt};
 use stm32h7xx_hal::prelude::*;
 use stm32h7xx_hal::serial::Event;
 
 use super::sdram::{self, Ports};
-use crate::common::{Board, receive_all, semihosting};
+use crate::common::uart::{self, Uart, UartPort, receive_all};
+use crate::common::{Board, semihosting};
 
 const HERTZ: u32 = 400_000_000;
 /// Baud rate. Both the debugger's serial port and the board can produce it from their clocks.
@@ -56,6 +58,9 @@ impl Disco {
 
 impl Board for Disco {
     const NAME: &'static str = "stm32h747i-disco";
+    const CLOCK_HZ: u32 = HERTZ;
+    const CYCLES: Option<fn() -> u32> = Some(DWT::cycle_count);
+    const LINK_BYTES: usize = uart::STATIC_BYTES;
 
     /// Prepares for a start without a debugger: text output is dropped, and a failure is a fault whose
     /// handler resets the chip.
@@ -99,10 +104,31 @@ impl Board for Disco {
         timer.clear_current();
         timer.enable_interrupt();
         timer.enable_counter();
+        core.DCB.enable_trace();
+        DWT::unlock();
+        core.DWT.enable_cycle_counter();
         // SAFETY: the handler is defined below, and no critical section is active.
         unsafe { NVIC::unmask(Interrupt::USART1) };
     }
 
+    fn port() -> impl Port {
+        UartPort::<Self>::new()
+    }
+
+    fn milliseconds() -> u32 {
+        MILLISECONDS.load(Ordering::Relaxed)
+    }
+
+    fn masked<R>(work: impl FnOnce() -> R) -> R {
+        cortex_m::interrupt::free(|_| work())
+    }
+
+    fn sleep() {
+        cortex_m::asm::wfi();
+    }
+}
+
+impl Uart for Disco {
     fn receive() -> Option<u8> {
         let uart = Self::uart();
         // An overrun interrupts until it is cleared; the damaged frame is sent again.
@@ -120,18 +146,6 @@ impl Board for Disco {
 
     fn listen(is_interrupt: bool) {
         Self::uart().cr1.modify(|_, control| control.rxneie().bit(is_interrupt));
-    }
-
-    fn milliseconds() -> u32 {
-        MILLISECONDS.load(Ordering::Relaxed)
-    }
-
-    fn masked<R>(work: impl FnOnce() -> R) -> R {
-        cortex_m::interrupt::free(|_| work())
-    }
-
-    fn sleep() {
-        cortex_m::asm::wfi();
     }
 }
 

@@ -1,12 +1,14 @@
 //! Registers and traps of the machine (QEMU, `hw/riscv/virt.c`; "NS16550A"; RISC-V "ACLINT", "PLIC" and
 //! privileged specifications).
 
+use photoncard_shared::link::Port;
 use riscv::interrupt::{Interrupt, machine};
-use riscv::register::{mcause, mepc, mie, mtval};
+use riscv::register::{mcause, mcycle, mepc, mie, mtval};
 use riscv_rt::{TrapFrame, core_interrupt};
 
 use crate::common::register::Register;
-use crate::common::{Board, receive_all, semihosting};
+use crate::common::uart::{self, Uart, UartPort, receive_all};
+use crate::common::{Board, semihosting};
 
 /// Timer ticks per millisecond, at 10 MHz.
 const TICKS: u64 = 10_000;
@@ -63,6 +65,8 @@ impl Virt {
 
 impl Board for Virt {
     const NAME: &'static str = "virt-riscv32";
+    const CYCLES: Option<fn() -> u32> = Some(|| mcycle::read() as u32);
+    const LINK_BYTES: usize = uart::STATIC_BYTES;
 
     fn start() {
         Self::wake_at(u64::MAX);
@@ -80,6 +84,25 @@ impl Board for Virt {
         }
     }
 
+    fn port() -> impl Port {
+        UartPort::<Self>::new()
+    }
+
+    fn milliseconds() -> u32 {
+        (Self::ticks() / TICKS) as u32
+    }
+
+    fn masked<R>(work: impl FnOnce() -> R) -> R {
+        machine::free(work)
+    }
+
+    fn sleep() {
+        Self::wake_at(Self::ticks() + TICKS);
+        riscv::asm::wfi();
+    }
+}
+
+impl Uart for Virt {
     fn receive() -> Option<u8> {
         (UART_STATUS.read() & STATUS_RECEIVED != 0).then(|| UART_DATA.read())
     }
@@ -94,19 +117,6 @@ impl Board for Virt {
 
     fn listen(is_interrupt: bool) {
         UART_INTERRUPT.write(is_interrupt.into());
-    }
-
-    fn milliseconds() -> u32 {
-        (Self::ticks() / TICKS) as u32
-    }
-
-    fn masked<R>(work: impl FnOnce() -> R) -> R {
-        machine::free(work)
-    }
-
-    fn sleep() {
-        Self::wake_at(Self::ticks() + TICKS);
-        riscv::asm::wfi();
     }
 }
 

@@ -1,7 +1,8 @@
 //! Board images on machines of QEMU render the same bits as the emulated card.
 #![cfg(unix)]
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -14,7 +15,7 @@ use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings, Renderer,
     Unobserved, card_info, card_self_test,
 };
-use photoncard_driver::scene::gltf;
+use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::Dram;
@@ -23,6 +24,9 @@ use photoncard_tests::{render_or_panic, skip};
 
 /// Time limit for building a board image and starting the machine.
 const START: Duration = Duration::from_secs(600);
+/// Time limit for a card to close a connection. Its clock is late on a busy host.
+const PATIENCE: Duration = Duration::from_secs(120);
+
 /// Prints a line even if the test passes.
 fn say(line: &str) {
     // A closed standard error does not end the test.
@@ -48,18 +52,42 @@ fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
 }
 
 impl Machine {
-    /// Starts a machine with a board image, and waits until its card is ready. Also returns the address of
-    /// its UART.
+    /// Starts a machine with a UART, and waits until its card is ready. Also returns the card's address.
     fn start(name: &str) -> (Self, CardAddress) {
-        Self::run(name, "qemu.sh", "pty", false)
+        Self::on_pty(name, "qemu.sh", "pty", false)
     }
 
     /// Starts a machine with a card made from a template, which says nothing, and waits for its pty.
     fn start_template(name: &str) -> (Self, CardAddress) {
-        Self::run(name, "template.sh", "run", true)
+        Self::on_pty(name, "template.sh", "run", true)
     }
 
-    fn run(name: &str, script: &str, argument: &str, is_mute: bool) -> (Self, CardAddress) {
+    fn on_pty(name: &str, script: &str, argument: &str, is_mute: bool) -> (Self, CardAddress) {
+        let (mut machine, start) = Self::build(script, name, argument);
+        let (mut address, mut is_ready) = (None, is_mute);
+        while address.is_none() || !is_ready {
+            let line = machine.next_line(name, START.saturating_sub(start.elapsed()));
+            is_ready |= line == "ready";
+            if let Some(path) = line.split(' ').find(|word| word.starts_with("/dev/")) {
+                address = Some(format!("serial:{path}").parse().expect("an address"));
+            }
+        }
+        (machine, address.expect("the loop ends with one"))
+    }
+
+    /// Starts a machine on a network, and waits until its card is ready. Also returns where it is reached.
+    fn start_on_network(name: &str) -> (Self, SocketAddr) {
+        // A port that is free now.
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        drop(listener);
+        let (mut machine, start) = Self::build("qemu.sh", name, &address.port().to_string());
+        while machine.next_line(name, START.saturating_sub(start.elapsed())) != "ready" {}
+        (machine, address)
+    }
+
+    /// Starts a script that builds an image and runs its machine.
+    fn build(script: &str, name: &str, argument: &str) -> (Self, Instant) {
         let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(script))
             .args([name, argument])
             .process_group(0)
@@ -70,17 +98,7 @@ impl Machine {
         let (sender, lines) = channel();
         forward(process.stdout.take().expect("it is piped"), sender.clone());
         forward(process.stderr.take().expect("it is piped"), sender);
-        let mut machine = Self { process, lines };
-        let start = Instant::now();
-        let (mut address, mut is_ready) = (None, is_mute);
-        while address.is_none() || !is_ready {
-            let line = machine.next_line(name, START.saturating_sub(start.elapsed()));
-            is_ready |= line == "ready";
-            if let Some(path) = line.split(' ').find(|word| word.starts_with("/dev/")) {
-                address = Some(format!("serial:{path}").parse().expect("an address"));
-            }
-        }
-        (machine, address.expect("the loop ends with one"))
+        (Self { process, lines }, Instant::now())
     }
 
     fn next_line(&mut self, name: &str, wait: Duration) -> String {
@@ -141,13 +159,30 @@ fn faults() -> Vec<LineFaults> {
     asked.split_whitespace().map(|faults| faults.parse().expect("faults of a line")).collect()
 }
 
-fn renders_as_the_emulated_card(name: &str) {
-    if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
-        return skip(&format!("{name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
+/// Returns whether machines cannot be tested, and says so.
+fn is_left_out(name: &str) -> bool {
+    let reason = std::env::var("PHOTONCARD_SKIP_QEMU");
+    if let Ok(reason) = &reason {
+        skip(&format!("{name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
     }
+    reason.is_ok()
+}
+
+fn cornell_box() -> Scene {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
-    let scene = gltf::load(&path).expect("a shipped scene loads");
-    let (machine, address) = Machine::start(name);
+    gltf::load(&path).expect("a shipped scene loads")
+}
+
+fn renders_over_a_uart(name: &str) {
+    if !is_left_out(name) {
+        let (machine, address) = Machine::start(name);
+        renders_as_the_emulated_card(name, &address);
+        drop(machine);
+    }
+}
+
+fn renders_as_the_emulated_card(name: &str, address: &CardAddress) {
+    let scene = cornell_box();
     let cached = settings().with(|s| s.integrator.irradiance_error = Some(0.1));
     // Renders with faults have other photons: most lines of their card image have to be sent.
     let mut renders = vec![(settings(), None), (cached, None)];
@@ -185,11 +220,10 @@ fn renders_as_the_emulated_card(name: &str) {
         // Only the second render has the card image of the previous render, of which no line is sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
-    passes_the_self_test(name, &address);
-    renders_everything(name, &address);
-    keeps_irradiance_records(name, &address);
-    stays_within_the_budget(name, &address);
-    drop(machine);
+    passes_the_self_test(name, address);
+    renders_everything(name, address);
+    keeps_irradiance_records(name, address);
+    stays_within_the_budget(name, address);
 }
 
 /// Runs the self-test: arithmetic equals the host's, and the memory has its full size. Afterwards, the next
@@ -316,10 +350,99 @@ fn a_card_from_the_embassy_template_renders_the_picture_of_the_emulated_card() {
 
 #[test]
 fn an_arm_board_renders_the_picture_of_the_emulated_card() {
-    renders_as_the_emulated_card("mps2-an386");
+    renders_over_a_uart("mps2-an386");
 }
 
 #[test]
 fn a_risc_v_board_renders_the_picture_of_the_emulated_card() {
-    renders_as_the_emulated_card("virt");
+    renders_over_a_uart("virt");
+}
+
+#[test]
+fn a_board_on_a_network_renders_the_picture_of_the_emulated_card() {
+    let name = "mps2-an386-tcp";
+    if !is_left_out(name) {
+        let (machine, address) = Machine::start_on_network(name);
+        renders_as_the_emulated_card(name, &card_at(address));
+        drop(machine);
+    }
+}
+
+#[test]
+fn a_board_on_a_network_serves_the_next_host_whatever_the_last_did() {
+    let name = "mps2-an386-tcp";
+    if is_left_out(name) {
+        return;
+    }
+    let (scene, settings) = (cornell_box(), settings());
+    let expected = render_or_panic(&scene, &settings).film;
+    let (machine, card) = Machine::start_on_network(name);
+    let at = |address| settings.clone().with(|s| s.cards.addresses = vec![card_at(address)]);
+    // The hosts break off while they open the session, load the scene, and render.
+    for bytes in [10, 1000, 8000] {
+        let result = Renderer::default().render(&scene, &at(breaking_off(card, bytes)), &Unobserved);
+        let error = result.err().expect("the link breaks off");
+        say(&format!("{name}: after {bytes} bytes of the card: {error}"));
+        await_next_turn(card);
+        let film = render_or_panic(&scene, &at(card)).film;
+        assert!(film.sums().eq(expected.sums()), "after {bytes} bytes of the card");
+    }
+    refuses_what_is_no_host(card);
+    await_next_turn(card);
+    let film = render_or_panic(&scene, &at(card)).film;
+    assert!(film.sums().eq(expected.sums()), "after connections of no host");
+    drop(machine);
+}
+
+fn card_at(address: SocketAddr) -> CardAddress {
+    format!("tcp:{address}").parse().expect("an address")
+}
+
+/// Returns an address by which one host reaches a card, until the card has sent a number of bytes.
+fn breaking_off(card: SocketAddr, bytes: u64) -> SocketAddr {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+    let address = listener.local_addr().expect("it is bound");
+    std::thread::spawn(move || {
+        let (mut host, _) = listener.accept().expect("a host connects");
+        drop(listener);
+        let mut card = TcpStream::connect(card).expect("the card listens");
+        let ends = [&host, &card].map(|end| end.try_clone().expect("a descriptor"));
+        let (mut from_host, mut to_card) = ends.into();
+        std::thread::spawn(move || std::io::copy(&mut from_host, &mut to_card));
+        // The end that fails first ends both.
+        let _ = std::io::copy(&mut Read::by_ref(&mut card).take(bytes), &mut host);
+        for end in [&host, &card] {
+            let _ = end.shutdown(Shutdown::Both);
+        }
+    });
+    address
+}
+
+/// Waits until a card has read the last bytes of a host that is gone, and serves another.
+fn await_next_turn(card: SocketAddr) {
+    let start = Instant::now();
+    while let Err(error) = card_info(&card_at(card)) {
+        assert!(start.elapsed() < PATIENCE, "{error}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// Connects to a card without being a host: sends other bytes, is second, is silent.
+fn refuses_what_is_no_host(card: SocketAddr) {
+    let connect = || {
+        let stream = TcpStream::connect(card).expect("the machine listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a limit");
+        stream
+    };
+    for bytes in [0, 1, 5000, 50_000] {
+        // The card may close the connection before it has read all.
+        let _ = connect().write_all(&vec![0x5A; bytes]);
+    }
+    let (mut first, mut second) = (connect(), connect());
+    for (stream, which) in [(&mut second, "second"), (&mut first, "silent")] {
+        match stream.read(&mut [0]) {
+            Ok(count) => assert_eq!(count, 0, "{which}"),
+            Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset, "{which}"),
+        }
+    }
 }

@@ -7,6 +7,19 @@ use photoncard_firmware::serve::Ring;
 use photoncard_shared::link::{Port, PortError};
 
 use super::board::Board;
+use super::deadline::Deadline;
+
+/// Board whose link is a UART.
+pub(crate) trait Uart: Board {
+    /// Takes a received byte from the UART; `None` if none has arrived.
+    fn receive() -> Option<u8>;
+
+    /// Writes a byte to the UART's transmitter. Returns false if the transmitter is full.
+    fn transmit(byte: u8) -> bool;
+
+    /// Enables or disables the receive interrupt of the UART.
+    fn listen(is_interrupt: bool);
+}
 
 /// Capacity of the ring of received bytes, far more than the few tile commands that a host sends while a card
 /// computes.
@@ -15,12 +28,12 @@ const RECEIVED_BYTES: usize = 512;
 static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
 
 /// On-chip memory of the port, bytes.
-pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
+pub(crate) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
 
 /// Handles the UART's interrupt: moves received bytes into the ring until the ring is full. When the ring is
-/// full, further bytes stay in the UART, and its interrupt is disabled until [`BoardPort`] has read from the
+/// full, further bytes stay in the UART, and its interrupt is disabled until [`UartPort`] has read from the
 /// ring.
-pub(crate) fn receive_all<B: Board>() {
+pub(crate) fn receive_all<B: Uart>() {
     while !RECEIVED.is_full() {
         let Some(byte) = B::receive() else { return };
         RECEIVED.put(byte);
@@ -29,32 +42,16 @@ pub(crate) fn receive_all<B: Board>() {
 }
 
 /// Port that uses a board's UART.
-pub(super) struct BoardPort<B>(PhantomData<B>);
+pub(crate) struct UartPort<B>(PhantomData<B>);
 
-impl<B: Board> BoardPort<B> {
+impl<B: Uart> UartPort<B> {
     /// Creates the port. A board has only one.
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self(PhantomData)
     }
 }
 
-/// Time limit of a wait: start and length, milliseconds.
-struct Deadline {
-    start: u32,
-    wait: u32,
-}
-
-impl Deadline {
-    fn new<B: Board>(wait: Duration) -> Self {
-        Self { start: B::milliseconds(), wait: u32::try_from(wait.as_millis()).unwrap_or(u32::MAX) }
-    }
-
-    fn is_over<B: Board>(&self) -> bool {
-        B::milliseconds().wrapping_sub(self.start) >= self.wait
-    }
-}
-
-impl<B: Board> Port for BoardPort<B> {
+impl<B: Uart> Port for UartPort<B> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
         let deadline = Deadline::new::<B>(wait);
         loop {
