@@ -193,6 +193,16 @@ check_boards() {
         refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
     done
 
+    # Cards in crates of their own, which the tests run in QEMU; and a processor without atomic exchange.
+    local template
+    for template in polled embassy; do
+        step "template $template"
+        tests/template.sh "$template" check
+    done
+    step "check for thumbv6m-none-eabi"
+    rustup target add thumbv6m-none-eabi
+    cargo clippy -p photoncard-firmware --target thumbv6m-none-eabi --features defmt,embedded-io,embedded-io-async --locked -- -D warnings
+
     step "figures of docs/bring-up.md"
     tests/bring_up_figures.sh check
 }
