@@ -334,6 +334,13 @@ fn states() -> Vec<String> {
         &[tile(1, 2, 2), write(0, &data), Command::EndImage],
         &format!("Order 0, Order 0, {pixels}"),
     );
+    talk.say(
+        "a tile while checksums are computed",
+        &[read(0, 1), tile(1, 2, 2)],
+        &format!("Checksums 0 1, {pixels}"),
+    );
+    talk.say("a tile after checksums", &[tile(1, 2, 2)], pixels);
+    talk.say("a tile after Compute", &[compute, tile(1, 2, 2)], &format!("Computed 84, {pixels}"));
     for (what, payload) in no_commands() {
         let length = payload.len();
         talk.send(what, &[payload], &format!("Message {length}"));
@@ -351,8 +358,26 @@ fn states() -> Vec<String> {
         talk.load(image);
     }
     talk.say("no image is left", &[write(0, &data), frame], "Order 0, Order 0");
-    let changed = |checksum: u64| Command::BeginImage { lines: 3, checksum: checksum ^ 1 };
     let end = Command::EndImage;
+    let load = [begin(3), write(0, &data), end];
+    talk.say(
+        "the check of an image: WriteLines",
+        &[&load[..], &load[1..2]].concat(),
+        "Order 0, ImageAccepted",
+    );
+    talk.say("the check of an image: BeginFrame", &[&load[..], &[frame]].concat(), "Order 0, ImageAccepted");
+    talk.say(
+        "the check of an image: Compute",
+        &[&load[..], &[compute]].concat(),
+        "Computed 84, ImageAccepted",
+    );
+    talk.say(
+        "the check of an image: checksums",
+        &[&load[..], &[read(0, 1)]].concat(),
+        "Checksums 0 1, ImageAccepted",
+    );
+    talk.say("the check of an image: BeginImage", &[&load[..], &load[..1]].concat(), "");
+    let changed = |checksum: u64| Command::BeginImage { lines: 3, checksum: checksum ^ 1 };
     talk.say(
         "another checksum",
         &[changed(checksum), write(0, &data), end],
