@@ -50,6 +50,8 @@ class Card(Frames):
                 self.execute(command.number(), command)
             except Fault as fault:
                 self.send(fault.reply)
+            except ValueError:
+                self.send(Fault(MESSAGE, len(command.data)).reply)
 
     def execute(self, kind, command):
         commands = (
@@ -76,7 +78,7 @@ class Card(Frames):
         self.send(b"\1" + number(first) + number(len(sums)) + sums)
 
     def begin_image(self, command):
-        self.size, self.image = command.number() * LINE, command.number()
+        self.size, self.image = command.number() * LINE, command.number(64)
         self.frame_size = None
         if not 0 < self.size <= MEMORY:
             self.size = None
@@ -136,7 +138,7 @@ def main(port):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             try:
                 Card(connection, memory).serve()
-            except (ConnectionError, IndexError) as error:
+            except ConnectionError as error:
                 print(f"the host has left: {error}", file=sys.stderr)
 
 

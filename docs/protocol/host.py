@@ -44,7 +44,7 @@ class Card(Frames):
         versions = reply.number(), reply.number()
         if versions != (PROTOCOL, LAYOUT):
             raise ValueError(f"the card has protocol and layout {versions}")
-        return [reply.number() for _ in range(15)]
+        return [reply.number(64) for _ in range(15)]
 
     def load(self, image):
         self.send(b"\2" + number(len(image) // LINE) + number(crc64(image)))

@@ -6,8 +6,9 @@ for byte in range(256):
     for _ in range(8):
         byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
     TABLE.append(byte)
-DATA, OPEN, ACKNOWLEDGE, PROBE, ANSWER = range(5)
+DATA, OPEN, ACKNOWLEDGE, PROBE, ANSWER, UNKNOWN = range(6)
 HEADER = struct.Struct("<BIHHB")
+MAX_PAYLOAD, MAX_FRAME = 1056, 1076
 LINE, RECORD = 128, 60
 PROTOCOL, LAYOUT = 17, 16
 
@@ -20,17 +21,20 @@ def crc32c(data):
 
 
 def stuffed(data):
-    """COBS: runs without a zero, each after its length plus one; then a zero."""
-    out = bytearray()
-    for run in data.split(b"\0"):
+    """COBS: runs without a zero, each after its length plus one. None follows a last run of 254 bytes."""
+    out, runs = bytearray(), data.split(b"\0")
+    for place, run in enumerate(runs):
         while len(run) >= 254:
             out += b"\xff" + run[:254]
             run = run[254:]
+            if not run and place + 1 == len(runs):
+                return bytes(out)
         out += bytes([len(run) + 1]) + run
-    return bytes(out) + b"\0"
+    return bytes(out)
 
 
 def unstuffed(data):
+    """The plain bytes; None if a run ends behind the data."""
     out, at = bytearray(), 0
     while at < len(data):
         length = data[at]
@@ -38,7 +42,24 @@ def unstuffed(data):
         at += length
         if length < 255 and at < len(data):
             out.append(0)
-    return bytes(out)
+    return bytes(out) if at == len(data) else None
+
+
+def plain_frame(kind, session, sequence, acknowledged, held, payload=b""):
+    """Bytes of a frame before COBS."""
+    body = HEADER.pack(kind, session, sequence, acknowledged, held) + payload
+    return body + struct.pack("<I", crc32c(body))
+
+
+def parsed_frame(data):
+    """Fields of the frame in the bytes before a zero; None if they are none."""
+    plain = unstuffed(data) if len(data) < MAX_FRAME else None
+    if plain is None or not HEADER.size + 4 <= len(plain) <= HEADER.size + MAX_PAYLOAD + 4:
+        return None
+    body = plain[:-4]
+    if struct.pack("<I", crc32c(body)) != plain[-4:] or body[0] > UNKNOWN:
+        return None
+    return *HEADER.unpack(body[: HEADER.size]), body[HEADER.size :]
 
 
 def number(value):
@@ -63,20 +84,47 @@ class Reader:
     def __init__(self, data):
         self.data, self.at = data, 0
 
-    def number(self):
-        value = shift = 0
-        while True:
-            byte = self.data[self.at]
-            self.at += 1
+    def raw(self, length):
+        self.at += length
+        if self.at > len(self.data):
+            raise ValueError("the message ends before its fields")
+        return self.data[self.at - length : self.at]
+
+    def number(self, bits=32):
+        value = 0
+        for shift in range(0, bits, 7):
+            byte = self.raw(1)[0]
             value |= (byte & 0x7F) << shift
-            shift += 7
-            if byte < 0x80:
+            if byte < 0x80 and value >> bits == 0:
                 return value
+            if byte < 0x80:
+                break
+        raise ValueError("an integer is too long")
+
+    def below(self, limit):
+        value = self.number()
+        if value >= limit:
+            raise ValueError("an unknown kind")
+        return value
 
     def bytes(self):
-        length = self.number()
-        self.at += length
-        return self.data[self.at - length : self.at]
+        return self.raw(self.number())
+
+    def floats(self, count):
+        return list(struct.unpack(f"<{count}f", self.raw(4 * count)))
+
+    def flag(self):
+        byte = self.raw(1)[0]
+        if byte > 1:
+            raise ValueError("neither 0 nor 1")
+        return byte
+
+    def option(self, read):
+        return read() if self.flag() else None
+
+    def end(self):
+        if self.at != len(self.data):
+            raise ValueError("bytes follow the message")
 
 
 def crc64(data):
@@ -100,8 +148,8 @@ class Frames:
         self.received, self.messages = b"", []
 
     def frame(self, kind, sequence=0, payload=b""):
-        body = HEADER.pack(kind, self.session, sequence, self.expected & 0xFFFF, 0) + payload
-        self.socket.sendall(stuffed(body + struct.pack("<I", crc32c(body))))
+        plain = plain_frame(kind, self.session, sequence, self.expected & 0xFFFF, 0, payload)
+        self.socket.sendall(stuffed(plain) + b"\0")
 
     def send(self, payload, kind=DATA):
         """Sends a message, when fewer than four are not acknowledged."""
@@ -122,21 +170,18 @@ class Frames:
                 raise ConnectionError("the other end has closed the link")
             self.received += data
         *frames, self.received = self.received.split(b"\0")
-        for plain in map(unstuffed, filter(None, frames)):
-            self.take_frame(plain[:-4], plain[-4:])
+        for frame in filter(None, map(parsed_frame, frames)):
+            self.take_frame(*frame)
 
-    def take_frame(self, body, checksum):
-        if len(body) < HEADER.size or struct.pack("<I", crc32c(body)) != checksum:
-            return
-        kind, session, sequence, acknowledged, _ = HEADER.unpack(body[: HEADER.size])
+    def take_frame(self, kind, session, sequence, acknowledged, _held, payload):
         if session != self.session and not (kind == OPEN and self.opened(session)):
             return
         self.acknowledged += acknowledged - self.acknowledged & 0xFFFF
         if kind == PROBE:
-            self.frame(ANSWER, self.next & 0xFFFF, body[HEADER.size :])
+            self.frame(ANSWER, self.next & 0xFFFF, payload)
         if kind in (DATA, OPEN) and sequence == self.expected & 0xFFFF:
             self.expected += 1
-            self.messages.append(body[HEADER.size :])
+            self.messages.append(payload)
             self.frame(ACKNOWLEDGE)
 
     def message(self):

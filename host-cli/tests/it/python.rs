@@ -108,3 +108,11 @@ fn a_card_in_python_serves_both_hosts() {
     assert_eq!(rendered(&room, &card.address), pattern);
     assert_eq!(rendered_by_python(&room, &card.address), Some(pattern));
 }
+
+/// A test of the firmware compares the same vectors with the program.
+#[test]
+fn the_test_vectors_hold_in_python() {
+    let Some(mut checker) = python("vectors.py") else { return };
+    let output = checker.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}

@@ -229,6 +229,10 @@ impl<K: ChipKind> Engine<K> {
         if self.tiles.len() + self.begun >= frame.tiles_of(self.chip.kind().budget()) as usize {
             return Err(too_many);
         }
+        if !self.is_at_work() {
+            // Results of a computation that were sent.
+            self.data.clear();
+        }
         self.is_flushed = false;
         self.waits = false;
         self.tiles.push_back(tile).map_err(|_| too_many)
@@ -245,23 +249,26 @@ impl<K: ChipKind> Engine<K> {
         transport: &mut Transport,
     ) -> Result<(), Fault> {
         if let Some(checksums) = &mut self.checksums {
-            return match checksums.step(memory, self.written) {
+            let result = match checksums.step(memory, self.written) {
                 Ok((checksum, is_last)) => {
-                    if self.data.extend_from_slice(&checksum.to_le_bytes()).is_err() {
-                        self.checksums = None;
-                        return Err(Invariant::Reply.fault());
-                    }
-                    if is_last {
-                        send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
-                        self.checksums = None;
-                    }
-                    Ok(())
+                    let bytes = checksum.to_le_bytes();
+                    self.data
+                        .extend_from_slice(&bytes)
+                        .map_err(|_| Invariant::Reply.fault())
+                        .map(|()| is_last)
                 }
-                Err(fault) => {
-                    self.checksums = None;
-                    Err(fault)
-                }
+                Err(fault) => Err(fault),
             };
+            if matches!(result, Ok(false)) {
+                return Ok(());
+            }
+            if result.is_ok() {
+                send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
+            }
+            self.checksums = None;
+            // The next reply may be of a tile that the host has sent meanwhile.
+            self.data.clear();
+            return result.map(|_| ());
         }
         match &self.image {
             ImageState::Checking(_) => return self.check(memory, transport),
