@@ -54,7 +54,7 @@ pub unsafe fn used(stack: Range<*mut u32>) -> usize {
 /// # Safety
 /// As for [`used`].
 pub unsafe fn is_used_up(stack: Range<*mut u32>) -> bool {
-    let size = stack.end.addr() - stack.start.addr();
-    // SAFETY: guaranteed by the caller.
-    unsafe { used(stack) + GUARD * size_of::<u32>() > size }
+    let guard = (stack.end.addr() - stack.start.addr()) / size_of::<u32>();
+    // SAFETY: the words belong to the stack, and are read as memory.
+    (0..guard.min(GUARD)).any(|word| unsafe { stack.start.add(word).read_volatile() } != PAINT)
 }

@@ -204,6 +204,8 @@ impl<B: Board, D: Nic> TcpPort<B, D> {
     /// Closes the connection, and listens for the next host.
     fn hang_up(&mut self) {
         self.handover.leave();
+        // The next host's time begins: its first frame may wait in the controller.
+        self.alone = self.now;
         self.socket().abort();
         // The host, if it is there, is told before the socket forgets it.
         self.send_frames(Instant::from_millis(self.now));

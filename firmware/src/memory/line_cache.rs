@@ -9,7 +9,7 @@ use core::fmt;
 use core::ops::Range;
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, FaultCode};
 
 use super::{CardMemory, MemoryPort, Stage, Work, outside};
 use crate::sampler::hash;
@@ -236,7 +236,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
 /// Fills a cache line with a block. Returns the first line of the block that is outside the memory, if any.
 ///
 /// # Errors
-/// If the line at `address` is outside the memory.
+/// If the line at `address` is outside the memory, or the memory's device fails at any line of the block.
 #[inline(always)]
 fn fill(
     lines: &mut [Line],
@@ -249,6 +249,7 @@ fn fill(
     for (number, line) in (first..=u32::MAX).zip(lines) {
         match memory.read(structure, LineAddress(number), 0..LINE_BYTES as u32) {
             Ok(read) => *line = *read,
+            Err(fault) if fault.code != FaultCode::LineRange => return Err(fault),
             Err(_) if number > address.0 => return Ok(Some(number)),
             // A line before `address` is outside the memory, so `address` is too.
             Err(fault) => return Err(Fault { detail: address.0, ..fault }),

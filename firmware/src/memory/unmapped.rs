@@ -7,7 +7,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::{CardMemory, MemoryPort, outside};
 
-/// Device that stores lines.
+/// Device that stores lines. Its calls block, also in an executor.
 pub trait LineDevice {
     /// Failure of the device. Its host reads a [`FaultCode::Memory`].
     type Error;
@@ -30,6 +30,7 @@ pub trait LineDevice {
 
 /// Card memory on a [`LineDevice`], read through a buffer of `N` lines, which is filled from a multiple of
 /// `N`. A sector of an SD card has four lines. [`LineCaches`](super::LineCaches) around it keep more lines.
+/// The memory test writes each byte of its pattern of byte lanes as a whole line.
 pub struct Unmapped<D, const N: usize> {
     device: D,
     buffer: [Line; N],
@@ -118,5 +119,81 @@ impl<D: LineDevice, const N: usize> CardMemory for Unmapped<D, N> {
 
     fn failure(&self) -> Option<Fault> {
         self.failed.map(failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::{CacheEntry, CacheShape, LineCache, LineCaches, SetIndex};
+
+    /// Device of 64 lines that hold their index. Reads of line `broken` fail.
+    struct Device {
+        broken: u32,
+    }
+
+    impl LineDevice for Device {
+        type Error = ();
+
+        fn lines(&self) -> u32 {
+            64
+        }
+
+        fn read(&mut self, first: u32, lines: &mut [Line]) -> Result<(), ()> {
+            for (address, line) in (first..).zip(lines) {
+                if address == self.broken {
+                    return Err(());
+                }
+                *line = Line([address as u8; LINE_BYTES]);
+            }
+            Ok(())
+        }
+
+        fn write(&mut self, _: u32, _: &[[u8; LINE_BYTES]]) -> Result<(), ()> {
+            Err(())
+        }
+    }
+
+    fn read(memory: &mut impl MemoryPort, address: u32) -> Result<u8, Fault> {
+        memory.read(Structure::Nodes, LineAddress(address), 0..4).map(|line| line.0[0])
+    }
+
+    #[test]
+    fn a_buffer_of_any_size_gives_each_line_and_refuses_those_outside() {
+        fn check<const N: usize>() {
+            let mut memory = Unmapped::<_, N>::new(Device { broken: u32::MAX });
+            for address in [0, 63, 5, 6, 62, 7, 63] {
+                assert_eq!(read(&mut memory, address), Ok(address as u8), "{N}");
+            }
+            assert_eq!(read(&mut memory, 64), Err(outside(LineAddress(64))));
+            assert!(memory.stored(LineAddress(60), 5).is_none() && memory.failure().is_none());
+            let lines = memory.stored(LineAddress(60), 4).map(|lines| lines[0]);
+            assert_eq!(lines, Some(Line([60; LINE_BYTES])));
+        }
+        check::<1>();
+        check::<4>();
+        check::<7>();
+        check::<100>();
+    }
+
+    #[test]
+    fn a_failure_of_the_device_behind_a_cache_is_no_end_of_the_memory() {
+        let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
+        let cache = LineCache::new(shape, [CacheEntry::EMPTY; 2], [Line::ZERO; 8]).unwrap();
+        let mut memory = LineCaches::unified(Unmapped::<_, 1>::new(Device { broken: 10 }), cache);
+        assert_eq!(read(&mut memory, 20), Ok(20));
+        for address in [8, 10] {
+            assert_eq!(read(&mut memory, address), Err(failure(10)));
+        }
+        assert_eq!((read(&mut memory, 20), read(&mut memory, 63)), (Ok(20), Ok(63)));
+    }
+
+    #[test]
+    fn a_write_that_fails_names_its_first_line() {
+        let mut memory = Unmapped::<_, 4>::new(Device { broken: u32::MAX });
+        assert_eq!(memory.write(Structure::Header, LineAddress(9), &[[0; LINE_BYTES]; 2]), None);
+        assert_eq!(memory.failure(), Some(failure(9)));
+        assert_eq!(memory.write(Structure::Header, LineAddress(63), &[[0; LINE_BYTES]; 2]), None);
+        assert_eq!(memory.failure(), None);
     }
 }

@@ -46,7 +46,9 @@ impl<R: fmt::Debug + fmt::Display, W: fmt::Debug + fmt::Display> core::error::Er
 type Received = RefCell<Deque<u8, RECEIVED>>;
 
 /// Serves a card on asynchronous devices until one of them fails. Reads go on while the card computes and
-/// writes: none is cancelled. Between two pieces of work the task yields to others of its executor.
+/// writes: none is cancelled. Between two pieces of work the task yields to others of its executor. Bytes that
+/// were received and not yet passed to the card are lost at the end, and if the future is dropped: the
+/// protocol repeats them.
 ///
 /// # Errors
 /// The end of the session; [`ServeError::Closed`] is the regular one.
@@ -59,11 +61,14 @@ pub async fn serve_async<K: ChipKind, M: CardMemory, R: Read, W: Write>(
     let mut receiving = pin!(receive(&received, reader));
     let mut working = pin!(work(&received, card, writer));
     // Bytes that have just been received are worked on in the same call.
-    poll_fn(|context| match receiving.as_mut().poll(context) {
+    let end = poll_fn(|context| match receiving.as_mut().poll(context) {
         Poll::Ready(end) => Poll::Ready(end),
         Poll::Pending => working.as_mut().poll(context),
     })
-    .await
+    .await;
+    // A device that fails at once, such as a disabled endpoint of USB, does not starve other tasks.
+    yield_now().await;
+    end
 }
 
 async fn receive<R: Read, E>(received: &Received, reader: &mut R) -> ServeError<R::Error, E> {

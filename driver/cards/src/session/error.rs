@@ -41,6 +41,13 @@ pub enum SessionError {
          with `outputs.partial.resume`"
     ))]
     OtherBudget,
+    /// Error of a card whose memory cannot be read, or is in part a scene in flash.
+    #[error("the card answers with a fault: {0}")]
+    #[diagnostic(help(
+        "a card with a scene in flash renders that scene alone, with `--prepared` and the file that it was made \
+         from, and has no self-test of its memory; otherwise check the memory and its device"
+    ))]
+    Memory(Fault),
     /// Error of a command that the card reports as failed.
     #[error("the card answers with a fault: {0}")]
     #[diagnostic(help(

@@ -37,6 +37,9 @@ impl Session {
                 self.begin_load();
                 Ok(())
             }
+            (_, Reply::Fault(fault @ Fault { code: FaultCode::Memory, .. })) => {
+                Err(SessionError::Memory(fault))
+            }
             (_, Reply::Fault(fault)) => Err(SessionError::Fault(fault)),
             (
                 State::Loading | State::Accepting | State::Framing,

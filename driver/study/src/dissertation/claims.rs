@@ -271,7 +271,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         published: "",
         evidence: built(
             "a card has one link, to its host ([protocol](protocol.md))",
-            "firmware/src/serve.rs",
+            "firmware/src/serve/mod.rs",
         ),
     },
     Claim {

@@ -275,11 +275,12 @@ impl<K: ChipKind> Engine<K> {
             ImageState::Testing(_) => return self.test(memory, transport),
             ImageState::None | ImageState::Loading(_) | ImageState::Ready(_) => {}
         }
-        let start = self.cycles.map(|cycles| cycles());
+        // Waiting for the host's next command is no work.
+        let cycles = self.cycles.filter(|_| self.has_work());
+        let start = cycles.map(|cycles| cycles());
         let result = self.render(memory, transport);
-        let end = self.cycles.map(|cycles| cycles());
-        if let (Some(start), Some(end)) = (start, end) {
-            self.spent = self.spent.wrapping_add(end.wrapping_sub(start).into());
+        if let (Some(cycles), Some(start)) = (cycles, start) {
+            self.spent = self.spent.wrapping_add(cycles().wrapping_sub(start).into());
         }
         if result.is_err() {
             self.drop_begun();

@@ -14,9 +14,9 @@ use photoncard_shared::link::IoPort;
 use photoncard_shared::message::Board;
 use static_cell::ConstStaticCell;
 
-/// The kind of chip. `Micro<8>` has 8 MB of card memory, `Nano` lives in 64 KB; one's own takes 14 lines, as
-/// `photoncard_firmware/src/kind/nano.rs`.
-type Kind = Micro<16>;
+/// The kind of chip. `Micro<8>` has 8 MB of card memory, `Nano` lives in 64 KB. The kind of one's own in
+/// docs/bring-up.md takes some 30 lines.
+pub type Kind = Micro<16>;
 
 /// The card, a static: 100 KB do not fit a stack. All of its bytes are zero, so that it takes no flash.
 static CARD: ConstStaticCell<Card<Kind, Dram<'static>>> =

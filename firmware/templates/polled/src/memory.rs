@@ -1,15 +1,24 @@
-//! Card memory and the stack, which lie between symbols of `memory.x`.
+//! Card memory and the stack, in the regions of `memory.x`.
 
+use core::mem::MaybeUninit;
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use photoncard_firmware::kind::FixedKind;
 use photoncard_firmware::stack;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::message::MemoryUse;
 
+use crate::Kind;
+
+/// Lines of the kind's card memory.
+const LINES: usize = Kind::BUDGET.dram_bytes as usize / LINE_BYTES;
+
+/// Card memory. The linker refuses a kind with more than the region DRAM of `memory.x` has.
+#[unsafe(link_section = ".dram")]
+static mut DRAM: MaybeUninit<[Line; LINES]> = MaybeUninit::uninit();
+
 unsafe extern "C" {
-    static mut __card_dram: [Line; 0];
-    static mut __card_dram_end: [Line; 0];
     static mut _stack_end: [u32; 0];
     static mut _stack_start: [u32; 0];
     static __sdata: [u8; 0];
@@ -21,14 +30,11 @@ unsafe extern "C" {
 /// Takes the whole card memory, once. External memory must be set up before.
 pub fn take_dram() -> &'static mut [Line] {
     static TAKEN: AtomicBool = AtomicBool::new(false);
-    let (start, end) = (&raw mut __card_dram, &raw mut __card_dram_end);
     if TAKEN.swap(true, Ordering::Relaxed) {
         return &mut [];
     }
-    let lines = (end.addr() - start.addr()) / LINE_BYTES;
-    // SAFETY: `memory.x` reserves this memory, which is aligned to a line, and any bytes are a line; it is
-    // taken once.
-    unsafe { core::slice::from_raw_parts_mut(start.cast(), lines) }
+    // SAFETY: any bytes are lines, and they are taken once.
+    unsafe { core::slice::from_raw_parts_mut((&raw mut DRAM).cast(), LINES) }
 }
 
 fn stack_words() -> Range<*mut u32> {
