@@ -53,8 +53,8 @@
 //! [`hash`] is the hash from which all random numbers are made.
 //!
 //! No function allocates or panics, whatever the input. `docs/protocol.md` describes the protocol for other
-//! implementations, `docs/glossary.md` defines the terms. [`heapless`] is a public dependency: its vectors are
-//! in signatures of [`frame`] and [`stuffing`].
+//! implementations, `docs/glossary.md` defines the terms. [`heapless`] is a public dependency: its vectors
+//! are in signatures of [`frame`] and [`stuffing`].
 #![forbid(unsafe_code)]
 #![no_std]
 // A chip must never panic: these lints warn of code that could, and each exception gives its reason.

@@ -46,8 +46,8 @@ impl<R: fmt::Debug + fmt::Display, W: fmt::Debug + fmt::Display> core::error::Er
 type Received = RefCell<Deque<u8, RECEIVED>>;
 
 /// Serves a card on asynchronous devices until one of them fails. Reads go on while the card computes and
-/// writes: none is cancelled. Between two pieces of work the task yields to others of its executor. Bytes that
-/// were received and not yet passed to the card are lost at the end, and if the future is dropped: the
+/// writes: none is cancelled. Between two pieces of work the task yields to others of its executor. Bytes
+/// that were received and not yet passed to the card are lost at the end, and if the future is dropped: the
 /// protocol repeats them.
 ///
 /// # Errors

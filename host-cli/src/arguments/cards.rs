@@ -102,7 +102,8 @@ pub(crate) struct ChipOption {
 #[derive(Args)]
 pub(crate) struct MemoryOption {
     /// Memory of each emulated card, in bytes or with the suffix K, M or G [default: a quarter of the
-    /// machine's free memory, at least 512M; emulated-micro, emulated-nano and chips of a file have their own memory]
+    /// machine's free memory, at least 512M; emulated-micro, emulated-nano and chips of a file have their
+    /// own memory]
     #[arg(long, value_name = "SIZE", value_parser = memory_size, help_heading = "Cards", hide_short_help = true)]
     card_memory: Option<u64>,
 }
