@@ -276,7 +276,7 @@ impl<'a, L: CardLink> Relay<'a, L> {
         let must_leave = self.exclude(index, format_args!("{error}"));
         match error {
             SessionError::Fault(fault) | SessionError::Memory(fault) if must_leave || error.is_wrong() => {
-                self.end_by(*fault)
+                self.end_by(*fault);
             }
             _ if error.is_wrong() => self.end_by(Invariant::Relayed.fault()),
             _ if must_leave => self.hang_up(),
