@@ -5,12 +5,12 @@ use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 
-/// Budget of the nano chip: 64 KB of SRAM, of which caches take none, and 1 MB of card memory.
+/// Budget of the nano chip: 64 KB of SRAM and 1 MB of card memory.
 pub const NANO: Budget = Budget {
     sram_bytes: 64 << 10,
     dram_bytes: 1 << 20,
-    photon_cache_bytes: 0,
-    scene_cache_bytes: 0,
+    photon_cache_bytes: 2 << 10,
+    scene_cache_bytes: 1 << 10,
     stack_bytes: 20 << 10,
     tile_pixels: 64,
     neighbors: 100,

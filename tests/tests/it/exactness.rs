@@ -78,7 +78,7 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated-large:2", "emulated:1"], 8, Hash, Some(300)),
         (&["emulated:7"], 4, Tiled, None),
         (&["emulated-micro:2", "emulated:1"], tile, Tiled, None),
-        (&["emulated-nano:2"], tile, Sort, None),
+        (&["emulated-nano:2"], 8, Sort, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
         schedule: Schedule {

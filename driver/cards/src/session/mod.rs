@@ -30,7 +30,8 @@ use std::time::Duration;
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
-use photoncard_shared::message::{self, Command, Drain, MemoryUse, OPERAND_BYTES};
+use photoncard_shared::image::LAYOUT_VERSION;
+use photoncard_shared::message::{self, Command, Drain, MemoryUse, OPERAND_BYTES, PROTOCOL_VERSION};
 use photoncard_shared::transport::Event as LineEvent;
 
 use self::channel::Channel;
@@ -351,9 +352,8 @@ impl Session {
             while let Some(message) = self.channel.transport.take() {
                 let payload = &mut payload[..message.len()];
                 payload.copy_from_slice(message);
-                if self.state == State::Greeting
-                    && let Some(Command::Hello { .. }) = message::decode(payload)
-                {
+                let own = Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION };
+                if self.state == State::Greeting && message::decode(payload) == Some(own) {
                     return Err(SessionError::Echo);
                 }
                 if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {
