@@ -19,7 +19,7 @@ const BOARDS: [Board; 4] = [
         directory: "mps2_an386",
         architecture: "arm",
     },
-    // The same board with another link.
+    // Board `mps2-an386` with Ethernet as its link.
     Board {
         feature: "CARGO_FEATURE_BOARD_MPS2_AN386_TCP",
         image: "mps2-an386-tcp",

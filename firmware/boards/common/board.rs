@@ -1,5 +1,8 @@
 //! Interface between a board's hardware and the code that all board images share.
 
+use core::marker::PhantomData;
+use core::time::Duration;
+
 use photoncard_shared::link::Port;
 
 /// Board with one link, one clock and one processor. Functions have no `self`, because there is one of each.
@@ -34,4 +37,23 @@ pub(crate) trait Board {
     /// Sleeps until an interrupt is pending, even if it is masked: the interrupt of the link, or that of the
     /// clock, which comes within a millisecond.
     fn sleep();
+}
+
+/// Time limit of a wait by a board's clock: start and length, milliseconds.
+pub(crate) struct Deadline<B> {
+    start: u32,
+    wait: u32,
+    board: PhantomData<B>,
+}
+
+impl<B: Board> Deadline<B> {
+    /// Starts a wait.
+    pub(crate) fn new(wait: Duration) -> Self {
+        let wait = u32::try_from(wait.as_millis()).unwrap_or(u32::MAX);
+        Self { start: B::milliseconds(), wait, board: PhantomData }
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        B::milliseconds().wrapping_sub(self.start) >= self.wait
+    }
 }

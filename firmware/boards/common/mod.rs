@@ -1,7 +1,6 @@
 //! Code that all board images share, including `main`. A board adds registers, time and interrupts.
 
-mod board;
-pub(crate) mod deadline;
+pub(crate) mod board;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
 mod dram;
 mod measure;

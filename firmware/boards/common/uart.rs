@@ -6,8 +6,7 @@ use core::time::Duration;
 use photoncard_firmware::serve::Ring;
 use photoncard_shared::link::{Port, PortError};
 
-use super::board::Board;
-use super::deadline::Deadline;
+use super::board::{Board, Deadline};
 
 /// Board whose link is a UART.
 pub(crate) trait Uart: Board {
@@ -53,7 +52,7 @@ impl<B: Uart> UartPort<B> {
 
 impl<B: Uart> Port for UartPort<B> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let deadline = Deadline::new::<B>(wait);
+        let deadline = Deadline::<B>::new(wait);
         loop {
             let mut count = 0;
             for target in &mut *buffer {
@@ -66,7 +65,7 @@ impl<B: Uart> Port for UartPort<B> {
                 B::listen(true);
                 receive_all::<B>();
             });
-            if count > 0 || deadline.is_over::<B>() {
+            if count > 0 || deadline.is_over() {
                 return Ok(count);
             }
             B::masked(|| {
@@ -78,10 +77,10 @@ impl<B: Uart> Port for UartPort<B> {
     }
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
-        let deadline = Deadline::new::<B>(wait);
+        let deadline = Deadline::<B>::new(wait);
         loop {
             let sent = bytes.iter().take_while(|&&byte| B::transmit(byte)).count();
-            if sent > 0 || deadline.is_over::<B>() {
+            if sent > 0 || deadline.is_over() {
                 return Ok(sent);
             }
         }

@@ -32,7 +32,7 @@ const MAC_CSR_CMD: Register<u32> = unsafe { Register::at(BASE + 0xA4) };
 const MAC_CSR_DATA: Register<u32> = unsafe { Register::at(BASE + 0xA8) };
 const E2P_CMD: Register<u32> = unsafe { Register::at(BASE + 0xB0) };
 
-/// What [`BYTE_TEST`] reads as, once the controller is awake.
+/// Value of [`BYTE_TEST`] once the controller is awake.
 const BYTE_ORDER: u32 = 0x8765_4321;
 /// `HW_CFG`: reset of the controller.
 const RESET: u32 = 1;

@@ -16,7 +16,7 @@ use smoltcp::socket::tcp::{Socket, SocketBuffer, State};
 use smoltcp::time::{self, Instant};
 use smoltcp::wire::{EthernetAddress, IpCidr, Ipv4Address};
 
-use crate::common::deadline::Deadline;
+use crate::common::board::Deadline;
 use crate::common::once::Once;
 use crate::common::{Board, semihosting};
 
@@ -244,11 +244,11 @@ impl<B: Board, D: Nic> TcpPort<B, D> {
 
 impl<B: Board, D: Nic> Port for TcpPort<B, D> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
-        let deadline = Deadline::new::<B>(wait);
+        let deadline = Deadline::<B>::new(wait);
         loop {
             self.poll();
             let count = self.receive(buffer);
-            if count > 0 || deadline.is_over::<B>() {
+            if count > 0 || deadline.is_over() {
                 return Ok(count);
             }
             self.sleep();
@@ -256,11 +256,11 @@ impl<B: Board, D: Nic> Port for TcpPort<B, D> {
     }
 
     fn write(&mut self, bytes: &[u8], wait: Duration) -> Result<usize, PortError> {
-        let deadline = Deadline::new::<B>(wait);
+        let deadline = Deadline::<B>::new(wait);
         loop {
             let count = self.take(bytes);
             self.poll();
-            if count > 0 || deadline.is_over::<B>() {
+            if count > 0 || deadline.is_over() {
                 return Ok(count);
             }
             self.sleep();

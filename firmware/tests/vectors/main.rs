@@ -14,7 +14,7 @@ use photoncard_shared::message::PROTOCOL_VERSION;
 
 use crate::json::{lines, sections, text};
 
-/// What a reader of the file has to know.
+/// Description of the file, its first field.
 const HEADING: &[&str] = &[
     "Test vectors of the protocol of docs/protocol.md. Bytes are in hexadecimal, in the order of the link or of",
     "memory; so are numbers in quotation marks, the highest digit first. Other numbers are decimal.",

@@ -7,6 +7,9 @@ use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, Command, PROTOCOL_VERSION};
 use photoncard_shared::transport::{LineStatistics, Transport};
 
+/// First message of a host.
+pub(super) const HELLO: Command = Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION };
+
 pub(super) struct Channel {
     pub(super) transport: Transport,
     /// Encoded commands that wait for room in the send window.
@@ -32,7 +35,7 @@ impl Channel {
         self.number = self.number.wrapping_add(1);
         self.commands.clear();
         self.transport.open(self.number);
-        self.send(&Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION });
+        self.send(&HELLO);
     }
 
     pub(super) fn send(&mut self, command: &Command) {

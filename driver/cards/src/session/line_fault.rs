@@ -104,7 +104,7 @@ impl fmt::Display for LineFault {
     }
 }
 
-/// What has come since the last message: bytes by value, and frames.
+/// Bytes received since the last message, counted by value, and frames.
 pub(super) struct Evidence {
     counts: [u32; 256],
     /// Number of line feeds directly after a carriage return.

@@ -30,11 +30,10 @@ use std::time::Duration;
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
-use photoncard_shared::image::LAYOUT_VERSION;
-use photoncard_shared::message::{self, Command, Drain, MemoryUse, OPERAND_BYTES, PROTOCOL_VERSION};
+use photoncard_shared::message::{self, Command, Drain, MemoryUse, OPERAND_BYTES};
 use photoncard_shared::transport::Event as LineEvent;
 
-use self::channel::Channel;
+use self::channel::{Channel, HELLO};
 use self::clock::{Clock, Failures};
 use self::error::check_versions;
 use self::job::State;
@@ -352,8 +351,7 @@ impl Session {
             while let Some(message) = self.channel.transport.take() {
                 let payload = &mut payload[..message.len()];
                 payload.copy_from_slice(message);
-                let own = Command::Hello { protocol: PROTOCOL_VERSION, layout: LAYOUT_VERSION };
-                if self.state == State::Greeting && message::decode(payload) == Some(own) {
+                if self.state == State::Greeting && message::decode(payload) == Some(HELLO) {
                     return Err(SessionError::Echo);
                 }
                 if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {

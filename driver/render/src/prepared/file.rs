@@ -10,6 +10,7 @@ use photoncard_picture::heading::{Heading, HeadingFault, Kind};
 use photoncard_picture::output::{OutputError, PendingFile};
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::Checksum;
+use photoncard_shared::embedded::FILE_ALIGNMENT;
 
 use super::head::Head;
 use super::scene::PreparedScene;
@@ -17,7 +18,7 @@ use crate::PROGRAM;
 
 pub(super) const KIND: Kind = Kind { name: "photoncard prepared scene", version: VERSION };
 /// Alignment of the card image in the file, bytes: a page of memory, which is a multiple of a line.
-const PAGE: u64 = 4096;
+const PAGE: u64 = FILE_ALIGNMENT as u64;
 /// Maximum number of lines of a card image, because no card has more than 4 GiB of memory.
 const MAX_LINES: u32 = u32::MAX / LINE_BYTES as u32;
 /// Number of bytes that are read at once.
