@@ -14,9 +14,19 @@ from link import (
 )
 
 # Fields of each message, in order. A field is a name and how it is written: a tuple is a structure, a list of
-# one an option of it, a number a kind below it, a string one of `WRITERS`.
+# one an option of it, a dictionary one of its structures after its number, a number a kind below it, a string
+# one of `WRITERS`.
 VECTOR = "vector"
-CAMERA = (("origin", VECTOR), ("forward", VECTOR), ("right", VECTOR), ("up", VECTOR))
+PROJECTION = {
+    0: (),
+    1: (("right", VECTOR), ("up", VECTOR), ("focus", "f32")),
+    2: (),
+    3: (("angles", "pair"),),
+}
+CAMERA = (
+    ("origin", VECTOR), ("forward", VECTOR), ("right", VECTOR), ("up", VECTOR), ("shift", "pair"),
+    ("projection", PROJECTION),
+)
 CAUSTICS = (("neighbors", "u32"), ("max_distance", "f32"))
 FRAME = (
     ("width", "u32"), ("height", "u32"), ("camera", CAMERA), ("seed", "u32"), ("first_sample", "u32"),
@@ -73,6 +83,7 @@ WRITERS = {
     "x64": lambda value: number(int(value, 16)),
     "f32": floats,
     "flag": lambda value: bytes([value]),
+    "pair": lambda value: floats(*value),
     "vector": lambda value: floats(*value),
     "bytes": lambda value: number(len(value) // 2) + bytes.fromhex(value),
     "text": lambda value: number(len(value.encode())) + value.encode(),
@@ -85,6 +96,7 @@ READERS = {
     "x64": lambda reader: f"{reader.number(64):016x}",
     "f32": lambda reader: reader.floats(1)[0],
     "flag": Reader.flag,
+    "pair": lambda reader: reader.floats(2),
     "vector": lambda reader: reader.floats(3),
     "bytes": lambda reader: reader.bytes().hex(),
     "text": lambda reader: reader.bytes().decode(),
@@ -95,6 +107,8 @@ READERS = {
 def written(kind, value):
     if isinstance(kind, tuple):
         return b"".join(written(of, value[name]) for name, of in kind)
+    if isinstance(kind, dict):
+        return number(value["kind"]) + written(kind[value["kind"]], value)
     if isinstance(kind, list):
         return option(None if value is None else written(kind[0], value))
     return number(value) if isinstance(kind, int) else WRITERS[kind](value)
@@ -103,6 +117,9 @@ def written(kind, value):
 def read(kind, reader):
     if isinstance(kind, tuple):
         return {name: read(of, reader) for name, of in kind}
+    if isinstance(kind, dict):
+        chosen = reader.below(len(kind))
+        return {"kind": chosen, **read(kind[chosen], reader)}
     if isinstance(kind, list):
         return reader.option(lambda: read(kind[0], reader))
     return reader.below(kind) if isinstance(kind, int) else READERS[kind](reader)

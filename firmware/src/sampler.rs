@@ -1,12 +1,12 @@
 //! Random numbers as functions of (seed, pixel, sample, dimension). They do not depend on chip, thread or
 //! order of execution.
 //!
-//! Positions in a pixel, positions on emitters and the first choices of an eye path are points of a sequence:
-//! the first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling. Any number of its
-//! first points is stratified, so that samples can be added to a picture. The order of the points is
-//! scrambled in the same way, so that patterns of different dimensions are independent (Burley 2020,
-//! *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one
-//! point in every elementary interval of area 2^-m.
+//! Positions in a pixel, on a lens and on emitters, and the first choices of an eye path are points of a
+//! sequence: the first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling. Any
+//! number of its first points is stratified, so that samples can be added to a picture. The order of the
+//! points is scrambled in the same way, so that patterns of different dimensions are independent (Burley
+//! 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has
+//! one point in every elementary interval of area 2^-m.
 //!
 //! The direction of a final gather ray is chosen by two coordinates. The first is jittered
 //! ([`Pattern::jitter`]) and selects a cell of the direction table ([`crate::importance::DirectionTable`]);
@@ -35,6 +35,8 @@ pub enum Dimension {
     Specular = 6,
     /// Direction of the ray that finds albedo and normal of a surface reflected in a sharp lobe.
     Features = 7,
+    /// Position on a thin lens.
+    Lens = 8,
 }
 
 /// Source of random points and numbers for one pixel, sample and dimension.

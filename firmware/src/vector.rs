@@ -47,6 +47,13 @@ pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 
     from_frame(axis, radius * x, radius * y, height)
 }
 
+/// Point of the unit disc, uniformly distributed for a uniform point of the unit square.
+pub(crate) fn point_on_disc([u, v]: [f32; 2]) -> [f32; 2] {
+    let (sine, cosine) = libm::sincosf(core::f32::consts::TAU * u);
+    let radius = libm::sqrtf(v);
+    [radius * cosine, radius * sine]
+}
+
 /// Normalised vector `vector / |vector|`; zero for a zero vector.
 #[inline(always)]
 pub(crate) fn unit(vector: Vec3) -> Vec3 {

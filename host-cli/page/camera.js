@@ -1,5 +1,6 @@
-// Cameras and their moves: pure functions. A camera is {position, look_at, fov}: metres, and vertical degrees; the top of its
-// picture is towards +y.
+// Cameras and their moves: pure functions. A camera is {position, look_at} in metres, and one of fov, the vertical degrees of a
+// perspective picture, height, the metres of an orthographic one, and angles, the degrees of a panorama. The top of its picture is
+// towards +y. It has the lens and the shift of the scene's camera `name`.
 
 export const add = (a, b) => a.map((value, axis) => value + b[axis]);
 export const sub = (a, b) => a.map((value, axis) => value - b[axis]);
@@ -7,6 +8,7 @@ export const scaled = (a, factor) => a.map(value => value * factor);
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const length = a => Math.hypot(...a);
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const radians = degrees => degrees * Math.PI / 180;
 const clamped = (value, low, high) => Math.min(Math.max(value, low), high);
 
 // Elevation that a turn does not pass: at 90 degrees the top of the picture would jump.
@@ -15,6 +17,8 @@ const STEEPEST = 89.5 * Math.PI / 180;
 const FARTHEST = 1e9;
 // Shortest view from a camera to what it looks at, as a share of its greatest coordinate: single precision tells its direction.
 const SHORTEST = 1e-3;
+// Lowest orthographic picture, metres.
+const LOWEST = 1e-6;
 // Sine of the angle to the vertical below which a direction counts as vertical, as in the renderer.
 const VERTICAL = 1e-6;
 
@@ -51,16 +55,27 @@ export function turned(camera, centre, yaw, pitch) {
     return { ...camera, position: turn(camera.position), look_at: turn(camera.look_at) };
 }
 
+// Height of what the picture shows at a depth, metres.
+function shown({ fov, height, angles }, depth) {
+    if (height !== undefined) return height;
+    return angles ? radians(angles[1]) * depth : 2 * Math.tan(radians(fov) / 2) * depth;
+}
+
 // Shift by a drag of pixels, so that what is `depth` metres away follows the pointer.
 export function panned(camera, [dx, dy], height, depth) {
     const { right, up } = axes(camera);
-    const metres = 2 * Math.tan(camera.fov * Math.PI / 360) * depth / height;
+    const metres = shown(camera, depth) / height;
     return moved(camera, add(scaled(right, -dx * metres), scaled(up, dy * metres)));
 }
 
-// Approach to a point: its distance is multiplied by `factor`, and it stays where it is in the picture.
-export const dollied = (camera, centre, factor) =>
-    moved(camera, scaled(sub(centre, camera.position), 1 - factor));
+// Approach to a point: its distance is multiplied by `factor`, and it stays where it is in the picture. An orthographic picture
+// shows less instead.
+export function dollied(camera, centre, factor) {
+    const way = scaled(sub(centre, camera.position), 1 - factor);
+    if (camera.height === undefined) return moved(camera, way);
+    const { forward } = axes(camera);
+    return moved(zoomed(camera, factor), sub(way, scaled(forward, dot(way, forward))));
+}
 
 // Flight by metres to the right, upwards (in the world) and forward.
 export function flown(camera, [rightward, upward, onward]) {
@@ -68,7 +83,12 @@ export function flown(camera, [rightward, upward, onward]) {
     return moved(camera, add(add(scaled(right, rightward), [0, upward, 0]), scaled(forward, onward)));
 }
 
-export const zoomed = (camera, factor) => ({ ...camera, fov: clamped(camera.fov * factor, 1, 150) });
+// A panorama has no zoom.
+export function zoomed(camera, factor) {
+    const { fov, height, angles } = camera;
+    if (height !== undefined) return { ...camera, height: clamped(height * factor, LOWEST, FARTHEST) };
+    return angles ? camera : { ...camera, fov: clamped(fov * factor, 1, 150) };
+}
 
 // Distance of a point along the view's axis.
 export const depth = (camera, point) => dot(sub(point, camera.position), axes(camera).forward);
@@ -77,10 +97,15 @@ export const depth = (camera, point) => dot(sub(point, camera.position), axes(ca
 export function projected(camera, point, [width, height]) {
     const { right, up, forward } = axes(camera);
     const ray = sub(point, camera.position);
-    const along = dot(ray, forward);
+    const [across, above, along] = [dot(ray, right), dot(ray, up), dot(ray, forward)];
+    if (camera.angles) {
+        const [longitudes, latitudes] = camera.angles.map(radians);
+        const [longitude, latitude] = [Math.atan2(across, along), Math.asin(clamped(above / length(ray), -1, 1))];
+        return [width * (0.5 + longitude / longitudes), height * (0.5 - latitude / latitudes)];
+    }
     if (along <= 0) return null;
-    const focal = height / (2 * Math.tan(camera.fov * Math.PI / 360));
-    return [width / 2 + focal * dot(ray, right) / along, height / 2 - focal * dot(ray, up) / along];
+    const scale = height / shown(camera, along);
+    return [width / 2 + scale * across, height / 2 - scale * above];
 }
 
 // Centre of turns while nothing is chosen: on the view's axis, as far away as the middle of the scene.
@@ -91,13 +116,19 @@ export function middle(camera, { low, high }) {
     return add(camera.position, scaled(axes(camera).forward, ahead));
 }
 
+// The one of fov, height and angles that a camera has, with `convert` applied to its numbers.
+export function extent({ fov, height, angles }, convert) {
+    if (height !== undefined) return { height: convert(height) };
+    return angles ? { angles: angles.map(convert) } : { fov: convert(fov) };
+}
+
 // The camera in single precision, as the renderer has it. From far away it looks at a place farther along its view.
 export function rounded(camera) {
-    const { position, look_at, fov } = camera;
+    const { position, look_at } = camera;
     const least = SHORTEST * greatest(position);
     const isNear = length(sub(look_at, position)) < least;
     const place = isNear ? add(position, scaled(axes(camera).forward, least)) : look_at;
-    return { position: position.map(Math.fround), look_at: place.map(Math.fround), fov: Math.fround(fov) };
+    return { ...camera, position: position.map(Math.fround), look_at: place.map(Math.fround), ...extent(camera, Math.fround) };
 }
 
 // The shortest decimal of a number in single precision.
@@ -112,7 +143,9 @@ export function shortest(value) {
 
 // Options of the command line that place a camera.
 export function pose(camera) {
-    const { position, look_at, fov } = rounded(camera);
+    const { position, look_at } = rounded(camera);
+    const { fov, height, angles } = extent(camera, shortest);
     const place = point => point.map(shortest).join(",");
-    return `--camera-at ${place(position)} --look-at ${place(look_at)} --fov ${shortest(fov)}`;
+    return `--camera-at ${place(position)} --look-at ${place(look_at)} `
+        + (height ? `--orthographic ${height}` : angles ? `--panorama ${angles.join(",")}` : `--fov ${fov}`);
 }

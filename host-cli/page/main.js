@@ -1,6 +1,6 @@
 // The page of `photoncard view`: connects the command, the picture and the controls.
 
-import { pose, projected, rounded, shortest } from "./camera.js";
+import { extent, pose, projected, rounded, shortest } from "./camera.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { displayOn } from "./display.js";
@@ -123,6 +123,18 @@ function setSteers(value) {
     if (steers) fit();
 }
 
+// Shows the field of view, or the height of an orthographic picture; a panorama's angles stay.
+function showExtent() {
+    if (!camera) return;
+    const isOrthographic = camera.height !== undefined;
+    const field = byId("fov");
+    [field.min, field.max] = isOrthographic ? [1e-6, 1e9] : [1, 150];
+    field.step = isOrthographic ? "any" : 1;
+    field.parentElement.hidden = camera.angles !== undefined;
+    byId("extent").textContent = isOrthographic ? "Height, metres" : "Field of view, degrees";
+    field.value = isOrthographic ? shortest(camera.height) : camera.angles ? "" : shortest(camera.fov);
+}
+
 function takeState(message) {
     const isFirst = state === null;
     state = message;
@@ -132,7 +144,7 @@ function takeState(message) {
     if (!isCameraOwn || !steers) camera = message.camera;
     panel.update(message);
     if (message.settled) times.settled(message.version);
-    if (document.activeElement !== byId("fov")) byId("fov").value = shortest(camera.fov);
+    if (document.activeElement !== byId("fov")) showExtent();
     exposure.renew();
     layOut();
     show();
@@ -257,13 +269,13 @@ on("camera", "change", ({ target }) => {
     const chosen = scene.cameras[target.value];
     if (target.value === "" || !chosen) return;
     const place = target.value;
-    view.move({ position: chosen.position, look_at: chosen.look_at, fov: chosen.fov }, false);
+    view.move(chosen, false);
     target.value = place;
 });
 // A typed value that is not possible gives way to the camera's.
-on("fov", "change", ({ target }) => camera && (target.value = shortest(camera.fov)));
+on("fov", "change", showExtent);
 on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" && camera &&
-    view.move({ ...camera, fov: Number(target.value) }, false));
+    view.move({ ...camera, ...extent(camera, () => Number(target.value)) }, false));
 on("reset", "click", () => {
     asked.edits.clear();
     followCamera();

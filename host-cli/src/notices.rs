@@ -35,7 +35,6 @@ impl Uses {
     fn uses(&self, concern: Concern) -> bool {
         match concern {
             Concern::View => self.view,
-            Concern::OtherCameras => false,
             Concern::Animations => self.animations,
             Concern::Environment => self.environment,
         }
@@ -128,7 +127,6 @@ mod tests {
     fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [
             (Concern::View, "--camera-at 1,2,3 --look-at 0,0,0", Some("--camera-at 1,2,3 --fov 30")),
-            (Concern::OtherCameras, "--camera eye", None),
             (Concern::Animations, "", Some("--frames 1-2 -o a.#.exr")),
             (Concern::Environment, "--environment 1,1,1", Some("")),
         ] {

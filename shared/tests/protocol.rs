@@ -287,12 +287,9 @@ fn structures_have_their_golden_bytes() {
     assert!(encoded(&hello).ends_with(&[b'x', 1, 1, b'b', 1, b'7', 0xac, 2]));
 
     let one = 1.0_f32.to_le_bytes();
-    let camera = Camera {
-        origin: [1.0, 0.0, 0.0],
-        forward: [0.0, 1.0, 0.0],
-        right: [0.0, 0.0, 1.0],
-        up: [1.0, 1.0, 0.0],
-    };
+    let projection = Projection::Panorama { angles: [1.0, 0.0] };
+    let axes = Camera::pinhole([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]);
+    let camera = Camera { shift: [1.0, 0.0], projection, ..axes };
     let frame = FrameParameters {
         width: 1,
         height: 2,
@@ -319,10 +316,13 @@ fn structures_have_their_golden_bytes() {
         adaptive_threshold: Some(1.0),
     };
     let zero = [0; 4];
-    let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
+    let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero, one, zero].concat();
     let bytes = [
         &[5, 1, 2][..],
         &camera,
+        &[3],
+        &one,
+        &zero,
         &[3, 10, 4, 11, 5, 6, 7],
         &one,
         &[2, 1],

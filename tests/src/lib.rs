@@ -76,15 +76,8 @@ pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
 pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
     let forward = forward.normalize();
     let right = forward.cross(Vec3::Y).normalize();
-    Camera {
-        name: "camera".into(),
-        origin,
-        right,
-        up: right.cross(forward),
-        forward,
-        vertical_fov: std::f32::consts::FRAC_PI_2,
-        aspect: None,
-    }
+    let axes = [right, right.cross(forward), forward];
+    Camera::perspective("camera", origin, axes, std::f32::consts::FRAC_PI_2, None)
 }
 
 /// Creates a scene of triangles, materials and one camera.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use photoncard_scene::{Camera, Scene};
+use photoncard_scene::{Camera, Lens, Projection, Scene};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{FrameParameters, PROTOCOL_VERSION};
 use serde::Serialize;
@@ -45,12 +45,25 @@ impl Provenance {
     }
 }
 
-/// Description of the camera with all changes applied: name, position in metres, unit vectors, vertical field
-/// of view in degrees.
+/// Description of the camera with all changes applied: name, position in metres, unit vectors, and the
+/// projection: vertical field of view in degrees, half the height in metres, or angles in degrees. Lens shift
+/// and lens are left out if there are none.
 fn view(camera: &Camera) -> Value {
-    let Camera { name, origin, right: _, up, forward, vertical_fov, aspect: _ } = camera;
+    let Camera { name, origin, right: _, up, forward, projection, shift, lens, aspect: _ } = camera;
     let [origin, up, forward] = [origin, up, forward].map(Vec3::to_array);
-    json!({"camera": name, "at": origin, "forward": forward, "up": up, "fov": vertical_fov.to_degrees()})
+    let mut view = json!({"camera": name, "at": origin, "forward": forward, "up": up});
+    match projection {
+        Projection::Perspective { vertical_fov } => view["fov"] = json!(vertical_fov.to_degrees()),
+        Projection::Orthographic { half_height } => view["orthographic"] = json!(2.0 * half_height),
+        Projection::Panorama { angles } => view["panorama"] = json!(angles.map(f32::to_degrees)),
+    }
+    if *shift != [0.0; 2] {
+        view["shift"] = json!(shift);
+    }
+    if let Some(Lens { radius, focus }) = lens {
+        (view["aperture"], view["focus"]) = (json!(2.0 * radius), json!(focus));
+    }
+    view
 }
 
 /// Number of chips of each kind.

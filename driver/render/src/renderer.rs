@@ -227,7 +227,7 @@ impl Kept {
 /// Origin of a picture's card image.
 pub(super) enum Source {
     /// The card image of an earlier picture, or of a prepared scene.
-    Kept(Kept),
+    Kept(Box<Kept>),
     /// A packed scene whose photons are still to be traced.
     Packed(Box<PackedScene>),
 }
@@ -243,7 +243,7 @@ impl Source {
         times: &mut Times,
     ) -> Result<(RenderSettings, Self), RenderError> {
         if let Some(kept) = kept.take_if(|kept| choose.is_none() && kept.is_of(scene, settings)) {
-            return Ok((settings.clone(), Self::Kept(kept)));
+            return Ok((settings.clone(), Self::Kept(Box::new(kept))));
         }
         let packing = Instant::now();
         let packed = PackedScene::new(scene)?;
@@ -280,7 +280,7 @@ impl Source {
             Self::Packed(packed) => *packed,
             Self::Kept(kept) => {
                 fit(&|budget| Ok(check_image(&kept.prepared.image, budget)?))?;
-                return Ok(kept);
+                return Ok(*kept);
             }
         };
         Ok(Kept {

@@ -46,9 +46,6 @@ pub struct SceneContents {
     pub generator: Option<String>,
     /// Names of the file's material variants (`KHR_materials_variants`).
     pub variants: Vec<String>,
-    /// Orthographic cameras of the file, which are not rendered: for each, the number of perspective cameras
-    /// before it, and its name.
-    pub orthographic: Vec<(usize, String)>,
     /// Sentences about missing contents of the file and about contents that the renderer ignores, each once.
     pub notices: Vec<String>,
     /// Notices that matter only to some pictures: index in [`Self::notices`], and the subject.
@@ -65,8 +62,6 @@ pub struct SceneContents {
 pub enum Concern {
     /// Default view, which a picture uses if no view is given for it.
     View,
-    /// Unusable cameras of a file that also has usable ones.
-    OtherCameras,
     /// Animations, which a picture of the scene without animation does not use.
     Animations,
     /// Environment light of the file. A picture may use the environment of another file instead.

@@ -345,16 +345,6 @@ pub enum SceneError {
         remedy: String,
     },
 
-    /// Error of a requested camera that is orthographic.
-    #[error("the camera '{name}' is orthographic, and only perspective cameras are rendered")]
-    #[diagnostic(code(scene::orthographic), help("{remedy}"))]
-    OrthographicCamera {
-        /// Name of the camera.
-        name: String,
-        /// Remedy, with the names of the scene's other cameras.
-        remedy: String,
-    },
-
     /// Error of an animation name that the scene's file lacks.
     #[error("the scene has no animation '{name}'")]
     #[diagnostic(code(scene::animation), help("choose one of: {animations}"))]

@@ -36,7 +36,7 @@ use std::sync::OnceLock;
 use glam::{DVec3, Vec3};
 use photoncard_shared::checksum::Checksum;
 
-pub use self::camera::Camera;
+pub use self::camera::{Aperture, Camera, Lens, Projection};
 pub use self::contents::{Concern, SceneContents};
 pub use self::environment::Environment;
 pub use self::instance::Instance;
@@ -181,14 +181,8 @@ impl Scene {
     /// Returns the camera of this name, or the first one for `None`.
     ///
     /// # Errors
-    /// If no camera has the name, or the camera is orthographic; the error lists the cameras' names.
+    /// If no camera has the name; the error lists the cameras' names.
     pub fn camera(&self, name: Option<&str>) -> Result<&Camera, SceneError> {
-        if let Some(name) = self.orthographic_camera(name) {
-            return Err(SceneError::OrthographicCamera {
-                name: name.to_owned(),
-                remedy: self.orthographic_remedy(),
-            });
-        }
         let found = match name {
             None => self.cameras.first(),
             Some(name) => self.cameras.iter().find(|camera| camera.name == name),
@@ -200,26 +194,6 @@ impl Scene {
                 remedy: self.camera_remedy(&cameras.join(", ")),
             }
         })
-    }
-
-    /// Name of the orthographic camera that was requested: the one of this name or, for `None`, the file's
-    /// first camera if it is orthographic.
-    fn orthographic_camera(&self, name: Option<&str>) -> Option<&str> {
-        let is_meant = |(before, camera): &&(usize, String)| match name {
-            None => *before == 0,
-            Some(name) => camera == name,
-        };
-        self.orthographic.iter().find(is_meant).map(|(_, name)| &**name)
-    }
-
-    fn orthographic_remedy(&self) -> String {
-        let others = self.cameras.iter().filter(|camera| camera.name != FRAMED);
-        let others: Vec<_> = others.map(|camera| format!("'{}'", camera.name)).collect();
-        let place = "place a perspective one by --camera-at X,Y,Z and --look-at X,Y,Z";
-        if others.is_empty() {
-            return format!("{place}, or export the camera as a perspective one");
-        }
-        format!("choose a perspective one by --camera: {}; or {place}", others.join(", "))
     }
 
     fn camera_remedy(&self, names: &str) -> String {
@@ -341,7 +315,7 @@ mod tests {
     fn camera(x: f32) -> Camera {
         let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
         let origin = Vec3::X * x;
-        Camera { name: "eye".to_owned(), origin, right, up, forward, vertical_fov: 1.0, aspect: None }
+        Camera::perspective("eye", origin, [right, up, forward], 1.0, None)
     }
 
     fn scene() -> Scene {

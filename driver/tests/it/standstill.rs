@@ -22,15 +22,13 @@ use crate::scripted_card::{Answer, Card, sound};
 const TILE: Tile = Tile { id: 3, x: 0, y: 0, width: 4, height: 4 };
 
 fn frame() -> FrameParameters {
-    let camera = Camera {
-        name: "camera".into(),
-        origin: glam::Vec3::ZERO,
-        right: glam::Vec3::X,
-        up: glam::Vec3::Y,
-        forward: glam::Vec3::NEG_Z,
-        vertical_fov: 1.0,
-        aspect: None,
-    };
+    let camera = Camera::perspective(
+        "camera",
+        glam::Vec3::ZERO,
+        [glam::Vec3::X, glam::Vec3::Y, glam::Vec3::NEG_Z],
+        1.0,
+        None,
+    );
     RenderSettings {
         picture: Picture { width: 4, height: 4, ..Picture::default() },
         integrator: Integrator { gather_rays: 100, samples: 10, ..Integrator::default() },

@@ -19,8 +19,6 @@ pub(super) fn check_frame(
 ) -> Result<(), Fault> {
     let free = u64::from(lines.saturating_sub(header.lines));
     let can_wait = budget.waiting_blocks > 0 && least_waiting_lines(frame, budget) <= free;
-    let camera = &frame.camera;
-    let camera = [camera.origin, camera.forward, camera.right, camera.up];
     let within = |value: u32, most: u32| (1..=most).contains(&value);
     let is_positive = |value: f32| value.is_finite() && value > 0.0;
     let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
@@ -28,7 +26,7 @@ pub(super) fn check_frame(
     let checks = [
         (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
         (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
-        (Parameter::Camera, camera.as_flattened().iter().all(|component| component.is_finite())),
+        (Parameter::Camera, frame.camera.is_finite()),
         (Parameter::FirstSample, frame.first_sample < budget.samples),
         (Parameter::Samples, frame.samples > 0 && last_sample <= budget.samples),
         (Parameter::PlannedSamples, within(frame.planned_samples, budget.samples)),

@@ -237,7 +237,7 @@ fn light_path<K: ChipKind, M: MemoryPort>(
     // The surface is read as in [`Pass::Direct`], because the last bits of its values depend on the way in
     // which it is read.
     if let Some(seen) = &view.seen {
-        eye::surface(context, view.film, seen, &mut point.surface)?;
+        eye::surface(context, &view.sample, seen, &mut point.surface)?;
     }
     for (component, light) in direct_light(context, at, &point)? {
         completion.add(frame, as_what, component, light);

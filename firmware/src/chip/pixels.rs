@@ -53,7 +53,7 @@ pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f
 
 /// Converts a view to a sample for the irradiance cache.
 pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
-    SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
+    SeenSample { pixel: [at.x, at.y], film: view.sample.film, surface: &view.surface }
 }
 
 /// Gather point at the end of an eye path whose sample has `paths` paths. If irradiance records cover the

@@ -118,8 +118,8 @@ impl StoredPoint {
             // The eye path is traced again.
             *surface = eye::view(context, at)?.surface().ok_or(Invariant::Surface.fault())?.surface;
         } else {
-            let film = eye::film_position(context, at);
-            eye::surface(context, film, &self.seen, surface)?;
+            let sample = eye::camera_sample(context, at);
+            eye::surface(context, &sample, &self.seen, surface)?;
         }
         Ok(())
     }

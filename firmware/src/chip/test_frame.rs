@@ -4,7 +4,7 @@ use photoncard_shared::message::{Camera, FrameParameters};
 
 /// Frame of 8x8 pixels with one sample per pixel and one ray of each kind.
 pub(super) fn frame() -> FrameParameters {
-    let camera = Camera { origin: [0.0; 3], forward: [0.0; 3], right: [0.0; 3], up: [0.0; 3] };
+    let camera = Camera::pinhole([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
     FrameParameters {
         width: 8,
         height: 8,

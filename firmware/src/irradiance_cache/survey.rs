@@ -18,6 +18,7 @@ use crate::kind::{Capacity, Map};
 use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
+use crate::scene::camera::pixel_side;
 use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
 use crate::vector::min;
 
@@ -187,7 +188,8 @@ fn new_record<M: MemoryPort>(
     // Records lie where eye rays meet surfaces, not behind mirrors and glass.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
-        let reach = MIN_REACH * min(allowed / ERROR_OF_MIN_REACH, 1.0) * eye::pixel_side(context, &surface);
+        let reach =
+            MIN_REACH * min(allowed / ERROR_OF_MIN_REACH, 1.0) * pixel_side(context.frame, surface.position);
         let least = reach / libm::sqrtf(allowed);
         Record::new(&surface, least)
     }))

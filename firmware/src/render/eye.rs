@@ -1,25 +1,33 @@
 //! Eye rays, and the eye paths that follow them through perfectly specular surfaces.
 
 use glam::Vec3;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Projection};
 
 use super::pixel_filter::place;
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::Dimension;
+use crate::scene::camera::{self, CameraSample};
 use crate::scene::light::environment_radiance;
-use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
-use crate::vector::unit;
+use crate::scene::{Seen, Surface, closest_hit, read_surface};
+use crate::vector::point_on_disc;
 
-/// Position of a path's eye ray in the picture, pixels from the upper left corner. The paths of a pixel are
-/// stratified over the pixel filter, which can extend beyond the pixel and the picture.
-pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
+/// Point of the picture and of the lens from which a path starts. The paths of a pixel are stratified over
+/// the pixel filter, which can extend beyond the pixel and the picture, and over the lens.
+pub fn camera_sample<M>(context: &Context<M>, pixel: PixelSample) -> CameraSample {
     let PixelSample { x, y, .. } = pixel;
-    let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);
-    let [jitter_x, jitter_y] = pattern.point(index);
-    let filter = context.frame.filter;
-    [x as f32 + place(filter, jitter_x), y as f32 + place(filter, jitter_y)]
+    let frame = context.frame;
+    let point = |dimension| {
+        let (pattern, index) = pixel.stratified(frame, dimension);
+        pattern.point(index)
+    };
+    let [jitter_x, jitter_y] = point(Dimension::Pixel);
+    let film = [x as f32 + place(frame.filter, jitter_x), y as f32 + place(frame.filter, jitter_y)];
+    match frame.camera.projection {
+        Projection::ThinLens { .. } => CameraSample { film, lens: point_on_disc(point(Dimension::Lens)) },
+        _ => CameraSample::of_film(film),
+    }
 }
 
 /// Surface at which an eye path ends.
@@ -32,9 +40,9 @@ pub struct View {
     pub seen: Option<Seen>,
     /// True if no perfectly specular surface lies between the eye and the surface.
     pub is_first: bool,
-    /// Position of the eye ray in the picture ([`film_position`]).
-    pub film: [f32; 2],
-    /// Depth of the eye ray's hit along the view axis, metres.
+    /// Point of the picture and of the lens from which the path starts ([`camera_sample`]).
+    pub sample: CameraSample,
+    /// [Depth](camera::depth) of the eye ray's hit, metres.
     pub depth: f32,
 }
 
@@ -49,7 +57,7 @@ pub enum Sight {
         /// Radiance, W/(sr m^2), times the throughput of the eye path. It is zero without an environment, and
         /// for a path that contributes nothing.
         radiance: Vec3,
-        /// Depth of the eye ray's hit along the view axis, metres; `None` if the ray itself leaves the scene.
+        /// [Depth](camera::depth) of the eye ray's hit, metres; `None` if the ray itself leaves the scene.
         depth: Option<f32>,
     },
 }
@@ -71,8 +79,8 @@ impl Sight {
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let film = film_position(context, pixel);
-    let ray = eye_ray(context, film);
+    let sample = camera_sample(context, pixel);
+    let ray = camera::ray(context.frame, &sample);
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Specular);
     // The first two random choices of a path are stratified over all paths of a pixel.
     let first = || pattern.point(index);
@@ -92,10 +100,10 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     let is_first = surface.specular.is_none();
     // Only the eye path can repeat a random choice between layers.
     let is_stored = is_first && surface.probability >= 1.0;
-    let along_axis = ray.direction.dot(context.frame.camera.forward.into());
+    let per_distance = camera::depth_per_distance(&context.frame.camera, ray.direction);
     if !is_first {
         let end = path.follow(context, &mut surface, &mut hit, &random)?;
-        let depth = Some(path.first_distance * along_axis);
+        let depth = Some(path.first_distance * per_distance);
         match end {
             PathEnd::Surface => {}
             PathEnd::Escaped => return background(context, &path, depth),
@@ -103,11 +111,15 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         }
     }
     Ok(Sight::Surface(View {
-        depth: if is_first { depth(context, &surface) } else { path.first_distance * along_axis },
+        depth: if is_first {
+            camera::depth(&context.frame.camera, surface.position)
+        } else {
+            path.first_distance * per_distance
+        },
         surface: surface.dimmed(path.throughput),
         seen: if is_stored { Seen::new(&hit) } else { None },
         is_first,
-        film,
+        sample,
     }))
 }
 
@@ -121,28 +133,29 @@ fn background<M: MemoryPort>(
     Ok(Sight::Background { radiance: radiance * path.throughput, depth })
 }
 
-/// Reads the surface at a stored hit of the eye ray through position `film` of the picture into `surface`.
+/// Reads the surface at a stored hit of the eye ray of `sample` into `surface`.
 ///
 /// # Errors
 /// If the card image is invalid.
 #[inline(always)]
 pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
-    film: [f32; 2],
+    sample: &CameraSample,
     seen: &Seen,
     surface: &mut Surface,
 ) -> Result<(), Fault> {
-    seen.surface(context.scene, context.memory, &eye_ray(context, film), surface)
+    seen.surface(context.scene, context.memory, &camera::ray(context.frame, sample), surface)
 }
 
-/// Finds the surface that the eye ray through position `film` of the picture hits first.
+/// Finds the surface that the eye ray through position `film` of the picture, and the centre of the lens,
+/// hits first.
 ///
 /// # Errors
 /// If the card image is invalid.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
-    let ray = eye_ray(context, film);
+    let ray = camera::ray(context.frame, &CameraSample::of_film(film));
     let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
     let mut found = Surface::NOWHERE;
     // Read as a stored hit is, whose rounding differs.
@@ -151,26 +164,4 @@ pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Op
         None => read_surface(context.scene, context.memory, &ray, &hit, &|_| 0.0, &mut found)?,
     }
     Ok(Some(found))
-}
-
-fn eye_ray<M>(context: &Context<M>, [x, y]: [f32; 2]) -> Ray {
-    let frame = context.frame;
-    let [u, v] = [x / frame.width as f32, y / frame.height as f32];
-    let camera = &frame.camera;
-    let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from_array);
-    let direction = forward + right * (2.0 * u - 1.0) + up * (1.0 - 2.0 * v);
-    Ray::new(camera.origin.into(), unit(direction))
-}
-
-/// Side length of a pixel's footprint at the depth of a surface, metres.
-pub fn pixel_side<M>(context: &Context<M>, surface: &Surface) -> f32 {
-    let frame = context.frame;
-    let up = libm::sqrtf(Vec3::from_array(frame.camera.up).length_squared());
-    depth(context, surface) * up * 2.0 / frame.height as f32
-}
-
-/// Distance of a surface along the view axis, metres.
-pub fn depth<M>(context: &Context<M>, surface: &Surface) -> f32 {
-    let camera = &context.frame.camera;
-    (surface.position - Vec3::from_array(camera.origin)).dot(camera.forward.into())
 }

@@ -2,6 +2,7 @@
 
 mod bundle;
 mod bvh;
+pub mod camera;
 mod corners;
 mod coverage;
 mod cut_out;

@@ -105,12 +105,7 @@ fn option(value: Option<impl std::fmt::Display>) -> String {
 pub(crate) const FRAME: FrameParameters = FrameParameters {
     width: 64,
     height: 48,
-    camera: Camera {
-        origin: [0.0, 0.0, 4.0],
-        forward: [0.0, 0.0, -1.0],
-        right: [0.5, 0.0, 0.0],
-        up: [0.0, 0.375, 0.0],
-    },
+    camera: Camera::pinhole([0.0, 0.0, 4.0], [0.0, 0.0, -1.0], [0.5, 0.0, 0.0], [0.0, 0.375, 0.0]),
     seed: 0,
     first_sample: 0,
     samples: 1,
@@ -138,10 +133,13 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     width: 1920,
     height: 1080,
     camera: Camera {
-        origin: [1.0, 2.0, 3.0],
-        forward: [0.0, -1.0, 0.0],
-        right: [0.0, 0.0, 0.625],
-        up: [0.25, 0.0, 0.0],
+        shift: [0.125, -0.5],
+        projection: Projection::ThinLens {
+            right: [0.0, 0.0, 0.015625],
+            up: [0.0078125, 0.0, 0.0],
+            focus: 2.5,
+        },
+        ..Camera::pinhole([1.0, 2.0, 3.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.625], [0.25, 0.0, 0.0])
     },
     seed: 7,
     first_sample: 16,
@@ -165,16 +163,33 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     adaptive_threshold: Some(0.0625),
 };
 
+fn projected(projection: &Projection) -> String {
+    match projection {
+        Projection::Pinhole => object(&[("kind", "0".into())]),
+        Projection::ThinLens { right, up, focus } => object(&[
+            ("kind", "1".into()),
+            ("right", floats(right)),
+            ("up", floats(up)),
+            ("focus", focus.to_string()),
+        ]),
+        Projection::Orthographic => object(&[("kind", "2".into())]),
+        Projection::Panorama { angles } => object(&[("kind", "3".into()), ("angles", floats(angles))]),
+    }
+}
+
 fn frame(frame: &FrameParameters) -> Vec<(&'static str, String)> {
-    let Camera { origin, forward, right, up } = &frame.camera;
-    let camera = [("origin", origin), ("forward", forward), ("right", right), ("up", up)];
+    let Camera { origin, forward, right, up, shift, projection } = &frame.camera;
+    let axes = [("origin", origin), ("forward", forward), ("right", right), ("up", up)];
+    let mut camera = axes.map(|(name, vector)| (name, floats(vector))).to_vec();
+    camera.push(("shift", floats(shift)));
+    camera.push(("projection", projected(projection)));
     let caustics = frame.caustics.map(|CausticGather { neighbors, max_distance }| {
         object(&[("neighbors", neighbors.to_string()), ("max_distance", max_distance.to_string())])
     });
     vec![
         ("width", frame.width.to_string()),
         ("height", frame.height.to_string()),
-        ("camera", object(&camera.map(|(name, vector)| (name, floats(vector))))),
+        ("camera", object(&camera)),
         ("seed", frame.seed.to_string()),
         ("first_sample", frame.first_sample.to_string()),
         ("samples", frame.samples.to_string()),
@@ -375,7 +390,7 @@ pub(crate) fn no_commands() -> Vec<(&'static str, Vec<u8>)> {
     let behind = |bytes: Vec<u8>, byte: u8| [&bytes[..], &[byte]].concat();
     let frame = encoded(&Command::BeginFrame(FRAME));
     let write = encoded(&Command::WriteLines { first: 0, data: &[0; 128] });
-    let (sampling, drain, filter, layers) = (62, 65, 74, 73);
+    let (projection, sampling, drain, filter, layers) = (59, 71, 74, 83, 82);
     vec![
         ("no bytes", Vec::new()),
         ("an unknown kind", vec![10]),
@@ -384,6 +399,7 @@ pub(crate) fn no_commands() -> Vec<(&'static str, Vec<u8>)> {
         ("a protocol of more than 16 bits", vec![0, 0x80, 0x80, 0x04, 16]),
         ("EndImage and a byte", vec![4, 0]),
         ("BeginFrame without its last byte", frame[..frame.len() - 1].to_vec()),
+        ("projection 4", changed(projection, 4)),
         ("sampling 4", changed(sampling, 4)),
         ("an option of neither 0 nor 1", changed(sampling + 1, 2)),
         ("drain 4", changed(drain, 4)),

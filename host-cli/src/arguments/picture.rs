@@ -4,7 +4,7 @@ use clap::Args;
 use photoncard_driver::film::Window;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::render::{Filter, Picture};
-use photoncard_driver::scene::Camera;
+use photoncard_driver::scene::{Aperture, Camera, Projection};
 
 use super::choice::choice;
 
@@ -71,6 +71,32 @@ pub(crate) struct PictureOptions {
     /// Vertical field of view, degrees [default: the camera's own]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f32>,
+    /// Parallel rays; the picture shows this height, metres [default: the camera's own projection]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, conflicts_with_all = ["fov", "panorama"], hide_short_help = true)]
+    orthographic: Option<f32>,
+    /// Equirectangular panorama of these longitudes and latitudes, degrees, such as 360,180 for all around
+    /// [default: the camera's own projection]
+    ///
+    /// 180 alone is 180,180, and 360 alone 360,180. Unless --size states both sides, the picture has their
+    /// ratio.
+    #[arg(long, value_name = "DEGREES", value_parser = panorama, allow_hyphen_values = true, conflicts_with = "fov", hide_short_help = true)]
+    panorama: Option<[f32; 2]>,
+    /// Lens shift to the right and to the top, as parts of the picture's longer side, as in Blender [default:
+    /// the camera's own]
+    ///
+    /// It moves the picture in its plane: 0,0.2 shows more of the top, and verticals stay vertical.
+    #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true, hide_short_help = true)]
+    shift: Option<[f32; 2]>,
+    /// Opening of a thin lens: an f-number such as f/2.8, or the diameter in metres; 0 is a pinhole [default:
+    /// the camera's own]
+    ///
+    /// An f-number is of a lens before a sensor whose longer side has 36 mm, as in Blender.
+    #[arg(long, value_name = "f/N|METRES", allow_hyphen_values = true)]
+    aperture: Option<Aperture>,
+    /// Distance of the plane in focus along the view direction, metres [default: the camera's own, or the
+    /// distance of --look-at]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    focus: Option<f32>,
     #[arg(
         long,
         value_name = "LIST",
@@ -90,7 +116,21 @@ pub(crate) struct PictureOptions {
 impl PictureOptions {
     /// Returns the settings that these options state. Settings that are not stated are those of `base`.
     pub(super) fn settings(&self, base: &Picture) -> Picture {
-        let Self { size, crop, camera, camera_at, look_at, fov, aov: _, filter } = self;
+        let Self {
+            size,
+            crop,
+            camera,
+            camera_at,
+            look_at,
+            fov,
+            orthographic,
+            panorama,
+            shift,
+            aperture,
+            focus,
+            aov: _,
+            filter,
+        } = self;
         let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
         Picture {
             width,
@@ -100,6 +140,11 @@ impl PictureOptions {
             camera_at: *camera_at,
             look_at: *look_at,
             fov: *fov,
+            orthographic: *orthographic,
+            panorama: *panorama,
+            shift: *shift,
+            aperture: *aperture,
+            focus: *focus,
             layers: self.layers(),
             filter: filter.unwrap_or(base.filter),
         }
@@ -124,9 +169,14 @@ impl PictureOptions {
             return None;
         }
         let (width, height) = camera.size(width.max(height))?;
-        let Camera { name, aspect, .. } = camera;
+        let Camera { name, aspect, projection, .. } = camera;
+        let kept = match projection {
+            Projection::Perspective { .. } => "the vertical field of view is kept",
+            Projection::Orthographic { .. } => "the height that it shows is kept",
+            Projection::Panorama { .. } => "the panorama is stretched",
+        };
         Some(format!(
-            "the camera '{name}' has an aspect ratio of {}, and the picture another; the vertical field of view is kept: \
+            "the camera '{name}' has an aspect ratio of {}, and the picture another; {kept}: \
              --size {width}x{height} shows what the file means",
             aspect.unwrap_or(1.0)
         ))
@@ -166,6 +216,21 @@ fn crop(text: &str) -> Result<Window, String> {
     }
 }
 
+fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok())
+}
+
+fn pair(text: &str) -> Result<[f32; 2], String> {
+    numbers(text).ok_or_else(|| "two numbers are X,Y, such as 0,0.2".into())
+}
+
+fn panorama(text: &str) -> Result<[f32; 2], String> {
+    let alone = |[longitude]: [f32; 1]| [longitude, 180.0];
+    let stated = numbers(text).or_else(|| numbers(text).map(alone));
+    stated.ok_or_else(|| "a panorama is LONGITUDES,LATITUDES in degrees, such as 360,180".into())
+}
+
 fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
@@ -182,7 +247,7 @@ mod tests {
         let camera = |aspect| {
             let [origin, right, up, forward] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
             let [origin, right, up, forward] = [origin, right, up, forward].map(Into::into);
-            Camera { name: "eye".to_owned(), origin, right, up, forward, vertical_fov: 1.0, aspect }
+            Camera::perspective("eye", origin, [right, up, forward], 1.0, aspect)
         };
         for (text, plain, wide) in [
             ("640x360", (640, 360), (640, 360)),

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::scene::gltf::Animation;
 use photoncard_driver::scene::{
-    Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene,
+    Camera, Encoding, Image, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use serde_json::{Value, json};
 
@@ -30,15 +30,24 @@ pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
 }
 
 fn camera(camera: &Camera, scene: &Scene) -> Value {
-    let Camera { name, origin, forward, up, vertical_fov, aspect, right: _ } = camera;
-    json!({
+    let Camera { name, origin, forward, up, projection, shift, lens, aspect, right: _ } = camera;
+    let mut described = json!({
         "name": name,
         "at": scene.in_file(*origin).to_array(),
         "forward": forward.to_array(),
         "up": up.to_array(),
-        "fov": vertical_fov.to_degrees(),
+        "projection": projection.name(),
         "aspect": aspect,
-    })
+        "shift": shift,
+        "aperture": lens.map(|lens| 2.0 * lens.radius),
+        "focus": lens.map(|lens| lens.focus),
+    });
+    match projection {
+        Projection::Perspective { vertical_fov } => described["fov"] = json!(vertical_fov.to_degrees()),
+        Projection::Orthographic { half_height } => described["height"] = json!(2.0 * half_height),
+        Projection::Panorama { angles } => described["angles"] = json!(angles.map(f32::to_degrees)),
+    }
+    described
 }
 
 fn animation(animation: &Animation) -> Value {

@@ -2,11 +2,13 @@
 
 mod json;
 
+use std::fmt::Write;
 use std::path::Path;
 
 use photoncard_driver::scene::gltf::{Animation, LoadSettings, SceneFile};
 use photoncard_driver::scene::{
-    Camera, Encoding, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture, Wrap,
+    Camera, Encoding, Image, Layers, Lens, Material, Projection, PunctualKind, PunctualLight, Reflection,
+    Scene, Texture, Wrap,
 };
 
 use crate::arguments::LightOptions;
@@ -90,10 +92,30 @@ fn image(image: &Image) -> String {
 }
 
 fn camera(camera: &Camera, scene: &Scene) -> String {
-    let degrees = camera.vertical_fov.to_degrees();
-    let (name, origin) = (&camera.name, scene.in_file(camera.origin));
-    let aspect = camera.aspect.map_or(String::new(), |aspect| format!(", aspect ratio {aspect}"));
-    format!("{name}: at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
+    let Camera { name, origin, projection, shift, lens, aspect, .. } = camera;
+    let mut line = format!("{name}: at {}", scene.in_file(*origin));
+    let _ = match projection {
+        Projection::Perspective { vertical_fov } => {
+            write!(line, ", vertical field of view {:.1} degrees", vertical_fov.to_degrees())
+        }
+        Projection::Orthographic { half_height } => {
+            write!(line, ", orthographic, {} m high", 2.0 * half_height)
+        }
+        Projection::Panorama { angles } => {
+            let [longitude, latitude] = angles.map(f32::to_degrees);
+            write!(line, ", panorama of {longitude:.1} by {latitude:.1} degrees")
+        }
+    };
+    if let Some(aspect) = aspect {
+        let _ = write!(line, ", aspect ratio {aspect}");
+    }
+    if *shift != [0.0; 2] {
+        let _ = write!(line, ", lens shift {},{}", shift[0], shift[1]);
+    }
+    if let Some(Lens { radius, focus }) = lens {
+        let _ = write!(line, ", aperture {} m, focus {focus} m", 2.0 * radius);
+    }
+    line
 }
 
 fn animation(animation: &Animation) -> String {

@@ -5,7 +5,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::layer::Layer;
 use photoncard_driver::render::{RenderSettings, Statistics};
 use photoncard_driver::scene::{
-    Camera, Environment, Material, PunctualKind, PunctualLight, Reflection, Scene,
+    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use serde_json::{Map, Value, json};
 
@@ -51,16 +51,22 @@ impl SceneFacts {
     }
 
     /// Camera as JSON, with the point around which pages turn it: on its axis, at the depth of the centre of
-    /// the scene's bounding box.
+    /// the scene's bounding box. It has the vertical field of view in degrees, the height in metres or the
+    /// angles in degrees.
     pub(super) fn camera(&self, camera: &Camera, scene: &Scene) -> Value {
         let middle = 0.5 * (self.low + self.high);
         let size = (self.high - self.low).length().max(1e-3);
         let distance = (middle - camera.origin).dot(camera.forward).max(0.1 * size);
-        json!({
+        let mut described = json!({
             "position": scene.in_file(camera.origin).to_array(),
             "look_at": scene.in_file(camera.origin + distance * camera.forward).to_array(),
-            "fov": camera.vertical_fov.to_degrees(),
-        })
+        });
+        match camera.projection {
+            Projection::Perspective { vertical_fov } => described["fov"] = json!(vertical_fov.to_degrees()),
+            Projection::Orthographic { half_height } => described["height"] = json!(2.0 * half_height),
+            Projection::Panorama { angles } => described["angles"] = json!(angles.map(f32::to_degrees)),
+        }
+        described
     }
 }
 

@@ -24,9 +24,7 @@ const MAX_NAME: usize = 1024;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
     Camera {
-        position: [f64; 3],
-        look_at: [f64; 3],
-        fov: f32,
+        view: View,
         is_moving: bool,
     },
     Set {
@@ -43,6 +41,27 @@ pub(super) enum Request {
     /// Total size of the tiles that the page has received since it connected, bytes.
     Shown(u64),
     Steer,
+}
+
+/// Camera of a page.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct View {
+    /// Name of the scene's camera whose lens and shift it has; `None` for that of the view so far.
+    pub(super) camera: Option<String>,
+    pub(super) position: [f64; 3],
+    pub(super) look_at: [f64; 3],
+    pub(super) shown: Extent,
+}
+
+/// Projection of a page's camera, by what the picture shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Extent {
+    /// Vertical field of view of a perspective picture, degrees.
+    Fov(f32),
+    /// Height of an orthographic picture, metres.
+    Height(f32),
+    /// Longitudes and latitudes of a panorama, degrees.
+    Angles([f32; 2]),
 }
 
 /// Request to save a picture.
@@ -89,12 +108,7 @@ pub(super) fn parse(text: &str) -> (Result<Request, Fault>, Option<u64>) {
 
 fn request(fields: &Fields) -> Result<Request, Fault> {
     Ok(match fields.text("type")?.as_str() {
-        "camera" => Request::Camera {
-            position: fields.place("position")?,
-            look_at: fields.place("look_at")?,
-            fov: fields.number("fov", 1e-3, 179.999)? as f32,
-            is_moving: fields.switch("moving")?,
-        },
+        "camera" => Request::Camera { view: view(fields)?, is_moving: fields.switch("moving")? },
         "set" => Request::Set { name: fields.text("name")?, value: fields.values("value")? },
         "setting" => Request::Setting(setting(fields)?),
         "reset" => Request::Reset,
@@ -107,6 +121,23 @@ fn request(fields: &Fields) -> Result<Request, Fault> {
         "shown" => Request::Shown(fields.whole("bytes", u64::MAX)?),
         "steer" => Request::Steer,
         other => return Err(Fault::Refused(format!("there is no message of the type {other:?}"))),
+    })
+}
+
+fn view(fields: &Fields) -> Result<View, String> {
+    let is_stated = |name: &str| fields.0.contains_key(name);
+    let shown = if is_stated("height") {
+        Extent::Height(fields.number("height", 1e-6, 1e9)? as f32)
+    } else if is_stated("angles") {
+        Extent::Angles(fields.angles("angles")?)
+    } else {
+        Extent::Fov(fields.number("fov", 1e-3, 179.999)? as f32)
+    };
+    Ok(View {
+        camera: if is_stated("name") { Some(fields.text("name")?) } else { None },
+        position: fields.place("position")?,
+        look_at: fields.place("look_at")?,
+        shown,
     })
 }
 
@@ -190,6 +221,14 @@ impl Fields<'_> {
         place.ok_or_else(|| format!("{name:?} is a place: a list of three numbers of metres"))
     }
 
+    fn angles(&self, name: &str) -> Result<[f32; 2], String> {
+        let list = self.field(name)?.as_array().filter(|list| list.len() == 2);
+        let number = |value: &Value| value.as_f64().map(|number| number as f32);
+        let numbers: Option<Vec<f32>> = list.and_then(|list| list.iter().map(number).collect());
+        let angles = numbers.and_then(|numbers| numbers.try_into().ok());
+        angles.ok_or_else(|| format!("{name:?} is a list of two angles in degrees"))
+    }
+
     fn pixel(&self, name: &str) -> Result<[u32; 2], String> {
         let list = self.field(name)?.as_array().filter(|list| list.len() == 2);
         let number =
@@ -215,12 +254,25 @@ impl Fields<'_> {
 mod tests {
     use super::*;
 
+    /// View of the tests' messages.
+    fn view(camera: Option<String>, shown: Extent) -> View {
+        View { camera, position: [1.0, 2.5, -3.0], look_at: [0.0; 3], shown }
+    }
+
     #[test]
     fn valid_messages_are_parsed() {
         for (text, request) in [
             (
                 r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"fov":40,"moving":true}"#,
-                Request::Camera { position: [1.0, 2.5, -3.0], look_at: [0.0; 3], fov: 40.0, is_moving: true },
+                Request::Camera { view: view(None, Extent::Fov(40.0)), is_moving: true },
+            ),
+            (
+                r#"{"type":"camera","name":"plan","position":[1,2.5,-3],"look_at":[0,0,0],"height":3,"moving":false}"#,
+                Request::Camera { view: view(Some("plan".into()), Extent::Height(3.0)), is_moving: false },
+            ),
+            (
+                r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"angles":[360,180],"moving":false}"#,
+                Request::Camera { view: view(None, Extent::Angles([360.0, 180.0])), is_moving: false },
             ),
             (
                 r#"{"type":"set","name":"a.b","value":2}"#,

@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use glam::Vec3;
 use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
@@ -220,8 +219,8 @@ impl View {
         let mut wish = self.wish.clone();
         let mut moves = None;
         match request {
-            Request::Camera { position, look_at, fov, is_moving } => {
-                wish.look(position, look_at, fov);
+            Request::Camera { view, is_moving } => {
+                wish.look(view);
                 moves = Some(is_moving);
             }
             Request::Set { name, value } => wish.set(name, value),
@@ -316,13 +315,7 @@ impl View {
         let message = match self.canvas.depth(self.refinement.version(), at) {
             None => json!({"type": "picked", "point": null}),
             Some(depth) => {
-                let size = [self.wish.settings.picture.width, self.wish.settings.picture.height];
-                let [width, height] = size.map(|side| side as f32);
-                let half = (0.5 * camera.vertical_fov).tan();
-                let right = (2.0 * (at[0] as f32 + 0.5) / width - 1.0) * half * width / height;
-                let up = (1.0 - 2.0 * (at[1] as f32 + 0.5) / height) * half;
-                let direction: Vec3 = camera.forward + right * camera.right + up * camera.up;
-                let point = camera.origin + depth * direction;
+                let point = self.wish.settings.seen_point(&camera, at, depth);
                 json!({"type": "picked", "point": self.scene.in_file(point).to_array(), "depth": depth})
             }
         };

@@ -7,7 +7,7 @@ use photoncard_driver::quality::{Fit, Stated};
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings};
 use photoncard_driver::scene::{Environment, Scene, SceneContents};
 
-use super::request::Setting;
+use super::request::{Extent, Setting, View};
 
 /// Value of `--ic-error` if a page switches on the irradiance cache and the quality has none.
 const IRRADIANCE_ERROR: f32 = 0.1;
@@ -46,10 +46,17 @@ impl Wish {
         &self.edits
     }
 
-    /// Sets position, target and field of view of the camera.
-    pub(super) fn look(&mut self, position: [f64; 3], look_at: [f64; 3], fov: f32) {
+    /// Sets position, target and projection of the camera, and whose lens and shift it has.
+    pub(super) fn look(&mut self, view: View) {
+        let View { camera, position, look_at, shown } = view;
         let picture = &mut self.settings.picture;
-        (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
+        (picture.camera_at, picture.look_at) = (Some(position), Some(look_at));
+        picture.camera = camera.or(picture.camera.take());
+        (picture.fov, picture.orthographic, picture.panorama) = match shown {
+            Extent::Fov(degrees) => (Some(degrees), None, None),
+            Extent::Height(metres) => (None, Some(metres), None),
+            Extent::Angles(degrees) => (None, None, Some(degrees)),
+        };
     }
 
     /// Sets a property. If it was set before, the new value replaces the earlier value at the same position

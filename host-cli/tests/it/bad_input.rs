@@ -154,11 +154,42 @@ fn numbers_out_of_range_are_refused() {
         ("--fov", "-20", ["above 0 and below 180", "such as 40"]),
         ("--fov", "180", ["above 0 and below 180", "such as 40"]),
         ("--fov", "wide", ["--fov", "invalid"]),
+        ("--orthographic", "0", ["above 0 metres", "such as 3"]),
+        ("--orthographic", "-1", ["above 0 metres", "such as 3"]),
+        ("--panorama", "400,180", ["up to 360 degrees", "give 360,180"]),
+        ("--panorama", "0", ["up to 360 degrees", "give 360,180"]),
+        ("--panorama", "1,2,3", ["LONGITUDES,LATITUDES", "360,180"]),
+        ("--shift", "0.1", ["two numbers", "0,0.2"]),
+        ("--shift", "0.1,inf", ["finite", "0,0.2"]),
+        ("--aperture", "f/0", ["f-number", "f/2.8"]),
+        ("--aperture", "-0.1", ["f-number", "f/2.8"]),
+        ("--aperture", "f/2.8", ["distance in focus", "in metres"]),
+        ("--focus", "2", ["a pinhole is in focus everywhere", "f/2.8"]),
         ("--texture-limit", "0", ["0 is not in 1..=16384", "--texture-limit"]),
         ("--texture-limit", "16385", ["16385 is not in 1..=16384", "--texture-limit"]),
         ("--card-memory", "100K", ["from 1M to 511G", "--card-memory"]),
     ] {
         refused(&room, "scene.gltf", &[option, value], &[option, words[0], words[1]]);
+    }
+}
+
+#[test]
+fn cameras_refuse_what_their_projection_lacks() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let around = ["--panorama", "360"];
+    for (options, words) in [
+        ([around, ["--shift", "0.1,0"]].concat(), ["--shift", "no lens shift"]),
+        ([around, ["--aperture", "0.1"]].concat(), ["--aperture", "in focus"]),
+        ([["--aperture", "0.1"], ["--focus", "-1"]].concat(), ["above 0", "f/2.8"]),
+        (
+            [["--aperture", "0.1"], ["--focus", "1"], ["--orthographic", "2"]].concat(),
+            ["perspective", "f/2.8"],
+        ),
+        ([["--fov", "40"], ["--orthographic", "2"]].concat(), ["--fov", "cannot be used with"]),
+        ([around, ["--orthographic", "2"]].concat(), ["--panorama", "cannot be used with"]),
+    ] {
+        refused(&room, "scene.gltf", &options, &words);
     }
 }
 

@@ -278,6 +278,41 @@ fn a_view_by_options_equals_that_of_a_camera_there() {
     assert!(pixels("other.gltf", &place) != expected);
 }
 
+/// Options and the camera in the file state equal projections.
+#[test]
+fn projections_by_options_equal_those_of_the_file() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let camera = |changes: Value| {
+        let mut stated = scene();
+        changes
+            .as_object()
+            .unwrap()
+            .iter()
+            .for_each(|(key, value)| stated["cameras"][0][key] = value.clone());
+        room.write_scene("stated.gltf", &stated);
+        room.rendered("stated.gltf", &["-o", "a.exr", "--size", "24x16"]);
+        picture(&room, "a.exr").pixels
+    };
+    let extras = |value: Value| json!({"extras": {"photoncard": value}});
+    let parallel = json!({"xmag": 3, "ymag": 1, "znear": 0.1, "zfar": 9});
+    let mut seen = Vec::new();
+    for (changes, options) in [
+        (json!({}), &[][..]),
+        (json!({"type": "orthographic", "orthographic": parallel}), &["--orthographic", "2"]),
+        (extras(json!({"panorama": [180, 90]})), &["--panorama", "180,90"]),
+        (extras(json!({"shift": [0.1, -0.2]})), &["--shift", "0.1,-0.2"]),
+        (extras(json!({"aperture": 0.25, "focus": 2})), &["--aperture", "0.25", "--focus", "2"]),
+        (extras(json!({"aperture": 0.25, "focus": 2.5})), &["--aperture", "0.25", "--look-at", "0,0.5,0.5"]),
+    ] {
+        let expected = camera(changes);
+        room.rendered("scene.gltf", &[&["-o", "b.exr", "--size", "24x16"], options].concat());
+        assert!(picture(&room, "b.exr").pixels == expected, "{options:?}");
+        assert!(!seen.contains(&expected), "{options:?} changes nothing");
+        seen.push(expected);
+    }
+}
+
 /// The chip is that of `docs/chip.toml`.
 #[test]
 fn chips_of_a_file_render_the_picture_of_the_reference_chip() {

@@ -90,19 +90,78 @@ pub const MAX_NAME_BYTES: usize = 64;
 /// Maximum number of checksums in one [`Reply::Checksums`].
 pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
-/// A pinhole camera. The point `(u, v)` of the picture, `u` from 0 to 1 to the right and `v` from 0 to 1
-/// downwards, is seen in the direction `forward + (2 u - 1) right + (1 - 2 v) up`.
+/// A camera. The point of the picture with the fractions `u` of its width, from the left, and `v` of its
+/// height, from the top, has the coordinates `x = 2 u - 1 + shift[0]` and `y = 1 - 2 v + shift[1]`. Its ray
+/// follows from them by [`Projection`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Camera {
-    /// Position of the pinhole, metres.
+    /// Position of the camera, metres.
     pub origin: [f32; 3],
-    /// Unit vector of the view direction.
+    /// Unit vector of the camera's axis.
     pub forward: [f32; 3],
-    /// Vector to the right edge of the picture, at distance 1 from the pinhole.
+    /// Vector to the right. Its length is stated at [`Projection`].
     pub right: [f32; 3],
-    /// Vector to the upper edge of the picture, at distance 1 from the pinhole.
+    /// Vector to the top. Its length is stated at [`Projection`].
     pub up: [f32; 3],
+    /// Offset of the picture's centre from the camera's axis, in halves of the picture's width and height:
+    /// the lens shift.
+    pub shift: [f32; 2],
+    /// Ray of a point of the picture.
+    pub projection: Projection,
+}
+
+/// Ray of a point `(x, y)` of the picture ([`Camera`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Projection {
+    /// A pinhole: from the origin in the direction `forward + x right + y up`. At distance 1, `right` and
+    /// `up` reach the edges of an unshifted picture.
+    #[default]
+    Pinhole,
+    /// A thin lens: from a point of the lens through the point of the plane in focus that a
+    /// [pinhole](Self::Pinhole) sees.
+    ThinLens {
+        /// Vector from the centre of the lens to its edge, parallel to `right`, metres.
+        right: [f32; 3],
+        /// Vector from the centre of the lens to its edge, parallel to `up`, metres.
+        up: [f32; 3],
+        /// Distance of the plane in focus along the axis, metres.
+        focus: f32,
+    },
+    /// Parallel rays: from `origin + x right + y up` in the direction `forward`. `right` and `up` are half
+    /// the picture's width and height, metres.
+    Orthographic,
+    /// An equirectangular panorama: from the origin at longitude `x angles[0]` and latitude `y angles[1]`,
+    /// in the direction `cos(latitude) (cos(longitude) forward + sin(longitude) right) + sin(latitude) up`.
+    /// `right` and `up` are unit vectors.
+    Panorama {
+        /// Half the angles that the picture shows, of longitude and of latitude, radians.
+        angles: [f32; 2],
+    },
+}
+
+impl Camera {
+    /// Pinhole camera without lens shift, of [`Projection::Pinhole`]'s vectors.
+    pub const fn pinhole(origin: [f32; 3], forward: [f32; 3], right: [f32; 3], up: [f32; 3]) -> Self {
+        Self { origin, forward, right, up, shift: [0.0; 2], projection: Projection::Pinhole }
+    }
+
+    /// Returns whether all numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let Self { origin, forward, right, up, shift, projection } = self;
+        let are_finite = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
+        let is_projection_finite = match projection {
+            Projection::Pinhole | Projection::Orthographic => true,
+            Projection::ThinLens { right, up, focus } => {
+                are_finite([*right, *up].as_flattened()) && focus.is_finite()
+            }
+            Projection::Panorama { angles } => are_finite(angles),
+        };
+        are_finite([*origin, *forward, *right, *up].as_flattened())
+            && are_finite(shift)
+            && is_projection_finite
+    }
 }
 
 /// Parameters of a frame. With the card image, they determine the pixels. Some of them only set the order of

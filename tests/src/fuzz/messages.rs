@@ -19,12 +19,7 @@ pub(super) struct Messages {
 
 /// Parameters of a frame that every kind of chip can render.
 pub(super) fn frame() -> FrameParameters {
-    let camera = Camera {
-        origin: [0.0, 1.0, 5.0],
-        forward: [0.0, 0.0, -1.0],
-        right: [1.0, 0.0, 0.0],
-        up: [0.0, 1.0, 0.0],
-    };
+    let camera = Camera::pinhole([0.0, 1.0, 5.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
     FrameParameters {
         width: 640,
         height: 480,

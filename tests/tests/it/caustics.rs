@@ -6,7 +6,9 @@ use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, m
 use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings,
 };
-use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene, Transmission};
+use photoncard_driver::scene::{
+    Material, Projection, PunctualKind, PunctualLight, Reflection, Scene, Transmission,
+};
 use photoncard_firmware::memory::Counted;
 use photoncard_firmware::photon::{CausticSearch, Caustics, LitBy, MIN_NORMAL_COSINE, reflected_caustics};
 use photoncard_firmware::scene::{PartialReflection, Surface};
@@ -35,7 +37,7 @@ fn two_balls() -> Scene {
     let materials =
         vec![lambertian("wall", 0.5), smooth("glass", 0.0, Some(glass)), smooth("metal", 1.0, None)];
     let mut view = camera(Vec3::new(0.1, -0.7, 0.1), Vec3::new(0.3, 1.0, 0.2));
-    view.vertical_fov = 0.6;
+    view.projection = Projection::perspective(0.6);
     let mut scene = scene(room([0; 6]), materials, view);
     add_ball(&mut scene, Vec3::new(-0.5, -0.6, 0.0), 0.3, 24, 1);
     add_ball(&mut scene, Vec3::new(0.55, -0.75, 0.1), 0.15, 24, 2);
@@ -83,7 +85,7 @@ fn mirror_behind_a_board(has_board: bool) -> Scene {
         triangles.extend(cuboid(Vec3::new(-0.85, 0.0, 0.0), Vec3::new(0.02, 0.9, 0.95), 0));
     }
     let mut view = camera(Vec3::new(0.5, 0.0, 0.0), Vec3::NEG_X);
-    view.vertical_fov = 0.6;
+    view.projection = Projection::perspective(0.6);
     let mut scene = scene(triangles, materials, view);
     let kind = PunctualKind::Point { position: Vec3::new(-0.93, 0.96, 0.2) };
     scene.lights.push(PunctualLight { name: "lamp".into(), kind, intensity: Vec3::ONE });

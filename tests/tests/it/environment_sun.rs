@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_driver::scene::{Camera, Environment, Scene};
+use photoncard_driver::scene::{Camera, Environment, Projection, Scene};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
 const WIDTH: u32 = 2048;
@@ -29,7 +29,7 @@ fn floor_under(column: u32, row: u32, sun: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, -z);
     let floor = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
     let view = camera(Vec3::new(0.0, 1.0, 1e-3), Vec3::new(0.0, -1.0, -1e-3));
-    let view = Camera { vertical_fov: 0.5, ..view };
+    let view = Camera { projection: Projection::perspective(0.5), ..view };
     let mut texels = vec![[SKY; 3]; (WIDTH * WIDTH / 2) as usize];
     texels[(row * WIDTH + column) as usize] = [sun; 3];
     let environment = Environment { width: WIDTH, height: WIDTH / 2, texels, strength: 1.0 };

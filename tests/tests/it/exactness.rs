@@ -10,7 +10,7 @@ use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Rendering, Sampling,
     Schedule,
 };
-use photoncard_driver::scene::{Scene, gltf};
+use photoncard_driver::scene::{Camera, Lens, Projection, Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_driver::sink::TileSink;
 use photoncard_driver::study::WholeFrame;
@@ -140,6 +140,18 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     }
 }
 
+/// Camera that sees the same place as `camera`, with another projection: by `number` from 1 on a shifted thin
+/// lens, parallel rays, a panorama.
+fn projected(camera: &Camera, number: usize) -> Camera {
+    let camera = camera.clone();
+    match number {
+        0 => camera,
+        1 => Camera { shift: [0.1, -0.2], lens: Some(Lens { radius: 0.05, focus: 1.5 }), ..camera },
+        2 => Camera { projection: Projection::Orthographic { half_height: 0.8 }, ..camera },
+        _ => Camera { projection: Projection::Panorama { angles: [4.0, 2.0] }, ..camera },
+    }
+}
+
 /// Sums of the layers of all pixels of a film; zero in a film without layers.
 fn layer_sums(film: &Film) -> Vec<LayerSums> {
     film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
@@ -193,8 +205,9 @@ proptest! {
         irradiance_error in prop::sample::select(&[None, Some(0.1), Some(1e-4)][..]),
         has_layers: bool,
         is_adaptive: bool,
+        projection in 0_usize..4,
     ) {
-        let scene = everything();
+        let scene = everything().with(|scene| scene.cameras[0] = projected(&scene.cameras[0], projection));
         let base = settings().with(|s| {
             (s.picture.width, s.picture.height) = (17, 13);
             s.photons.count = 1500;
@@ -252,6 +265,14 @@ fn textures_cut_outs_mirrors_glass_and_lights_of_every_kind_are_exact() {
         s.photons.caustic_photons = Some(1000);
     });
     check_variants_of(&everything(), &small);
+}
+
+#[test]
+fn every_projection_is_exact() {
+    for number in 1..4 {
+        let scene = glossy().with(|scene| scene.cameras[0] = projected(&scene.cameras[0], number));
+        check_variants_of(&scene, &few_pixels());
+    }
 }
 
 #[test]

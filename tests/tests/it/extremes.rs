@@ -7,7 +7,7 @@ use photoncard_driver::photon::trace;
 use photoncard_driver::render::{
     CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render,
 };
-use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
+use photoncard_driver::scene::{Material, Projection, Scene, Triangle, gltf};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 fn settings() -> RenderSettings {
@@ -38,7 +38,7 @@ fn tilted_floor(half_side: f32) -> Scene {
     triangles.extend(square(n * 2.0, 0.5, -1.0, 1));
     let eye = Vec3::new(0.1, 0.2, 0.3) + n * 1.5 + u * 0.7;
     let mut view = camera(eye, -n + u * -0.4);
-    view.vertical_fov = 0.5;
+    view.projection = Projection::perspective(0.5);
     scene(triangles, vec![lambertian("floor", 0.5), emitting("lamp", 0.0, Vec3::ONE)], view)
 }
 

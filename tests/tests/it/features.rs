@@ -9,8 +9,8 @@ use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Coat, Encoding, Environment, Image, Layers, Material, NormalMap, Reflection, Scene, Texture,
-    Triangle,
+    Camera, Coat, Encoding, Environment, Image, Layers, Material, NormalMap, Projection, Reflection, Scene,
+    Texture, Triangle,
 };
 use photoncard_tests::shapes::{add_tangents, add_textured_quad};
 use photoncard_tests::{camera, glass, lambertian, mean, quad, render_or_panic, room, scene, skip};
@@ -76,7 +76,7 @@ fn room_before(wall: Option<Material>, view: Camera) -> Scene {
 /// A camera, and its mirror image in the plane z = -1.
 fn both_cameras() -> [Camera; 2] {
     let view = camera(Vec3::new(0.1, 0.2, 0.4), Vec3::new(-0.1, -0.25, -1.0));
-    let view = Camera { vertical_fov: 0.6, ..view };
+    let view = Camera { projection: Projection::perspective(0.6), ..view };
     let turned = |vector: Vec3| Vec3::new(vector.x, vector.y, -vector.z);
     let [origin, right, up, forward] = [view.origin, view.right, view.up, view.forward].map(turned);
     let image = Camera { origin: origin - 2.0 * Vec3::Z, right, up, forward, ..view.clone() };
@@ -202,7 +202,7 @@ fn a_pane_has_the_albedo_behind_it_times_its_tint_and_that_of_its_reflection() {
     };
     let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };
     let materials = vec![wall, glass("pane", Vec3::new(1.0, 0.5, 0.2), false)];
-    let view = Camera { vertical_fov: 0.1, ..camera(Vec3::ZERO, -Vec3::Z) };
+    let view = Camera { projection: Projection::perspective(0.1), ..camera(Vec3::ZERO, -Vec3::Z) };
     let triangles = [&room([0; 6])[..], &pane(-0.5)].concat();
     let all = albedos(&film(&scene(triangles, materials, view)));
     for (channel, tint) in [1.0, 0.5, 0.2].into_iter().enumerate() {

@@ -8,8 +8,8 @@ use photoncard_driver::film::PixelLayers;
 use photoncard_driver::layer;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Coat, Encoding, Environment, Image, Layers, Material, PunctualKind, PunctualLight, Reflection, Scene,
-    Texture, Triangle,
+    Coat, Encoding, Environment, Image, Layers, Material, Projection, PunctualKind, PunctualLight,
+    Reflection, Scene, Texture, Triangle,
 };
 use photoncard_tests::shapes::{add_textured_quad, cuboid};
 use photoncard_tests::{camera, glass, lambertian, mean, quad, radiances, render_or_panic, room, scene};
@@ -46,7 +46,7 @@ fn square(half: f32, y: f32, sign: f32, material: u32) -> [Triangle; 2] {
 /// Floor below panes. The camera is below them too, and sees the floor at the origin.
 fn floor(pane: Material, panes: &[Triangle]) -> Scene {
     let mut view = camera(Vec3::new(0.0, 0.3, 0.4), Vec3::new(0.0, -0.3, -0.4));
-    view.vertical_fov = 0.02;
+    view.projection = Projection::perspective(0.02);
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let triangles = [&square(60.0, 0.0, 1.0, FLOOR), panes].concat();
     scene(triangles, vec![lambertian("floor", ALBEDO), lamp, pane], view)
@@ -307,7 +307,7 @@ fn light_reflected_by_a_pane_is_a_caustic() {
         let kind = PunctualKind::Directional { direction: Vec3::new(half, -half, 0.0) };
         scene.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(3.0) });
         // In a wider field of view the caustic is gathered at many positions.
-        scene.cameras[0].vertical_fov = 0.6;
+        scene.cameras[0].projection = Projection::perspective(0.6);
         let [direct, _, caustic] = irradiances(&scene, &settings());
         let [sun, cosine] = [3.0 * f64::from(half), f64::from(half)];
         assert!((direct[0] / sun - 1.0).abs() < 0.01, "{}", direct[0]);

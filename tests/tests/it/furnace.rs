@@ -5,7 +5,7 @@ use glam::Vec3;
 use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings,
 };
-use photoncard_driver::scene::{Material, Scene};
+use photoncard_driver::scene::{Material, Projection, Scene};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
 
 const EMISSION: f32 = 1.0;
@@ -83,7 +83,7 @@ fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     for angle in [0.0_f32, 0.6, 1.1] {
         let origin = Vec3::new(0.5 * angle.sin(), 0.0, 0.5 * angle.cos());
         let mut view = camera(origin, -origin);
-        view.vertical_fov = 0.02;
+        view.projection = Projection::perspective(0.02);
         let scene = scene(triangles.clone(), vec![walls.clone(), phong.clone()], view);
         let film = render_or_panic(
             &scene,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Environment, Material, PunctualKind, PunctualLight, Reflection, Scene,
+    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use photoncard_tests::{camera, mean, quad, radiances, render_or_panic, scene};
 
@@ -31,7 +31,7 @@ fn surface(base: f32, metallic: f32, roughness: f32) -> Material {
 /// Camera 20 m from the origin, at which it looks with a field of view of 2 degrees.
 fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 20.0;
-    Camera { vertical_fov: 2.0_f32.to_radians(), ..camera(origin, -origin) }
+    Camera { projection: Projection::perspective(2.0_f32.to_radians()), ..camera(origin, -origin) }
 }
 
 fn under_a_white_sky(scene: Scene) -> Scene {

@@ -4,8 +4,8 @@
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, PunctualKind,
-    PunctualLight, Reflection, Scene, Sheen, Texture, Transmission,
+    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, Projection,
+    PunctualKind, PunctualLight, Reflection, Scene, Sheen, Texture, Transmission,
 };
 use photoncard_tests::shapes::{add_ball, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
@@ -75,7 +75,10 @@ fn plate_of(material: Material, cosine: f32) -> Scene {
 
 fn from_afar(cosine: f32) -> Camera {
     let direction = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.01).normalize();
-    Camera { vertical_fov: 2.0_f32.to_radians(), ..camera(direction * 20.0, -direction) }
+    Camera {
+        projection: Projection::perspective(2.0_f32.to_radians()),
+        ..camera(direction * 20.0, -direction)
+    }
 }
 
 /// Directional albedos of a GGX lobe with F0 0.04 and F90 1 by quadrature: roughness, cosine, albedo.
@@ -230,7 +233,7 @@ fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
             quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
         };
         let mut view = camera(Vec3::new(0.0, 0.3, 0.9), Vec3::new(0.0, -0.3, -0.9));
-        view.vertical_fov = 0.3;
+        view.projection = Projection::perspective(0.3);
         let triangles = [square(1.0, 0.0, 0), square(1.2, 0.5, 1)].concat();
         let sun = PunctualLight {
             name: "sun".to_owned(),

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
-    VertexAttributes,
+    Camera, Encoding, Environment, Image, Material, Projection, PunctualKind, PunctualLight, Scene, Texture,
+    Triangle, VertexAttributes,
 };
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
@@ -21,7 +21,7 @@ fn floor(half: f32, material: u32) -> [Triangle; 2] {
 /// Camera that sees about a centimetre of the floor around `place`.
 fn view(place: Vec3) -> Camera {
     let origin = place + Vec3::new(0.3, 1.0, 0.2);
-    Camera { vertical_fov: 0.01, ..camera(origin, place - origin) }
+    Camera { projection: Projection::perspective(0.01), ..camera(origin, place - origin) }
 }
 
 fn bare_floor(place: Vec3) -> Scene {
@@ -131,7 +131,7 @@ fn the_eye_sees_the_environment() {
     let (theta, phi) = (PI * 1.5 / 4.0, 2.0 * PI * (4.5 / 8.0 - 0.5));
     let direction =
         Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
-    let view = Camera { vertical_fov: 0.001, ..camera(Vec3::Y, direction) };
+    let view = Camera { projection: Projection::perspective(0.001), ..camera(Vec3::Y, direction) };
     let environment = Some(sky());
     let scene =
         bare_floor(Vec3::ZERO).with(|scene| (scene.environment, scene.cameras) = (environment, vec![view]));
@@ -223,7 +223,7 @@ fn a_white_bowl_under_a_white_sky_is_white() {
     }
     let white = Material { double_sided: true, ..lambertian("white", 1.0) };
     let mut bowl = scene(triangles, vec![white], camera(at(0.2, 2.5, 0.3), at(0.01, -1.0, 0.02)));
-    bowl.cameras[0].vertical_fov = 0.5;
+    bowl.cameras[0].projection = Projection::perspective(0.5);
     bowl.environment = Some(Environment::constant(Vec3::splat(2.0)));
     let settings = settings(16, 64).with(|s| {
         s.photons.count = 200_000;

@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Rendering,
 };
-use photoncard_driver::scene::{Material, Scene, Triangle};
+use photoncard_driver::scene::{Material, Projection, Scene, Triangle};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
 use super::specular::mirror;
@@ -53,7 +53,7 @@ fn a_lamp_is_seen_after_any_number_of_reflections() {
         let scene = scene(
             [plane(0.0, 1.0), plane(1.0, -1.0), lamp].concat(),
             vec![mirror(reflectance), part_of_furnace(0.0)],
-            photoncard_driver::scene::Camera { vertical_fov: 5e-4, ..view },
+            photoncard_driver::scene::Camera { projection: Projection::perspective(5e-4), ..view },
         );
         let (seen, rendering) = rendered(&scene, &settings().with(|s| s.integrator.samples = 128));
         let expected = f64::from(reflectance).powi(bounces.into());

@@ -4,6 +4,7 @@ mod adaptive;
 mod blender;
 mod boards;
 mod caches;
+mod cameras;
 mod card;
 mod caustics;
 mod density;

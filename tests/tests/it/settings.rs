@@ -13,7 +13,7 @@ use photoncard_driver::render::{
     CardAddress, CardSet, Filter, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
     Schedule, Setting, TileOutputs,
 };
-use photoncard_driver::scene::Scene;
+use photoncard_driver::scene::{Aperture, Lens, Projection, Scene};
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::study::{Point, Scale};
 use photoncard_tests::everything::everything;
@@ -78,6 +78,11 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             camera_at: Pixels = Some([0.1, 0.2, 2.0]),
             look_at: Pixels = Some([0.1, 0.2, -0.3]),
             fov: Pixels = Some(20.0),
+            orthographic: Pixels = Some(1.0),
+            panorama: Pixels = Some([90.0, 60.0]),
+            shift: Pixels = Some([0.1, -0.2]),
+            aperture: Pixels = Some(Aperture::Diameter(0.3)),
+            focus: Pixels = Some(0.7),
             layers: Pixels = Layers::all(),
             filter: Pixels = Filter::Gaussian,
         }
@@ -145,9 +150,10 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
 /// Scene with every feature, seen by two cameras.
 fn with_two_cameras() -> Scene {
     let mut scene = everything();
+    scene.cameras[0].lens = Some(Lens { radius: 0.05, focus: 1.5 });
     let mut second = scene.cameras[0].clone();
     second.name = "second".into();
-    second.vertical_fov *= 0.9;
+    second.projection = Projection::perspective(0.9 * second.vertical_fov().unwrap());
     scene.cameras.push(second);
     scene
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Encoding, Environment, Image, Material, Reflection, Scene, Texture, Transmission,
+    Encoding, Environment, Image, Material, Projection, Reflection, Scene, Texture, Transmission,
 };
 use photoncard_tests::shapes::{add_ball, add_textured_quad, cuboid};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
@@ -98,7 +98,7 @@ fn lossless_objects_are_invisible_in_a_furnace() {
 /// Mean of a picture of a small area at the origin, seen from `from`.
 fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Material>, from: Vec3) -> f64 {
     let mut view = camera(from, -from);
-    view.vertical_fov = 0.02;
+    view.projection = Projection::perspective(0.02);
     let scene = scene(triangles, materials, view);
     let settings = settings().with(|s| {
         s.picture.width = 16;
@@ -184,7 +184,7 @@ fn specular_surfaces_alone_show_the_sky() {
     };
     for (material, expected) in [(mirror(1.0), 1.0), (Material::new("coat", coat), 0.04 + 0.96 * 0.8)] {
         let mut view = camera(Vec3::Z, Vec3::NEG_Z);
-        view.vertical_fov = 0.02;
+        view.projection = Projection::perspective(0.02);
         let mut scene = scene(pane.to_vec(), vec![material], view);
         scene.environment = Some(Environment::constant(Vec3::ONE));
         let settings = settings().with(|s| {
@@ -218,7 +218,7 @@ fn a_texture_without_metal_makes_glass_of_a_metallic_factor() {
         };
         let material = Material { metallic_roughness_texture: Some(0), ..Material::new("pane", reflection) };
         let mut view = camera(Vec3::Z, Vec3::NEG_Z);
-        view.vertical_fov = 0.02;
+        view.projection = Projection::perspective(0.02);
         let mut scene = scene(lamp(-2.0, 1.0).to_vec(), vec![black_lamp(), material], view);
         let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let corners = [corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)];

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_driver::scene::{Encoding, Image, Material, Reflection, Scene, Texture, Wrap};
+use photoncard_driver::scene::{Encoding, Image, Material, Projection, Reflection, Scene, Texture, Wrap};
 use photoncard_tests::shapes::{add_ball, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
 
@@ -35,7 +35,7 @@ fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
 /// left corner.
 fn canvas(material: Material) -> Scene {
     let mut view = camera(Vec3::Z, Vec3::NEG_Z);
-    view.vertical_fov = std::f32::consts::FRAC_PI_2;
+    view.projection = Projection::perspective(std::f32::consts::FRAC_PI_2);
     let mut scene = scene(Vec::new(), vec![material], view);
     let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
     add_textured_quad(&mut scene, corners, [[0., 1.], [1., 1.], [1., 0.], [0., 0.]], 0);
@@ -303,7 +303,7 @@ fn a_sheet_of_partial_coverage_is_invisible_in_a_furnace() {
 fn smooth_normals_are_interpolated_between_corners() {
     let mut ball = scene(Vec::new(), vec![Material { emission: Vec3::ONE, ..lambertian("ball", 0.0) }], {
         let mut view = camera(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z);
-        view.vertical_fov = 0.4;
+        view.projection = Projection::perspective(0.4);
         view
     });
     add_ball(&mut ball, Vec3::ZERO, 1.0, 12, 0);

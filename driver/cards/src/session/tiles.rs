@@ -131,7 +131,7 @@ mod tests {
     const TILE: Tile = Tile { id: 3, x: 0, y: 0, width: 5, height: 2 };
 
     fn frame() -> FrameParameters {
-        let camera = Camera { origin: [0.0; 3], forward: [0.0; 3], right: [0.0; 3], up: [0.0; 3] };
+        let camera = Camera::pinhole([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
         FrameParameters {
             width: 5,
             height: 2,

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::specular_path::{Arrival, Carried, Passes, SpecularPath};
+use photoncard_firmware::scene::camera::ray_at;
 use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
 use photoncard_shared::layout::{Photon, decode_normal, encode_normal};
 use photoncard_shared::message::{Camera, Fault};
@@ -126,10 +127,7 @@ impl<M: MemoryPort> Walk<'_, M> {
         used: &mut Vec<Importon>,
     ) -> Result<(), Fault> {
         let [u, v] = self.random.bounce(u32::MAX).point();
-        let (across, down) = (left + u * self.side, above + v * self.side);
-        let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from_array);
-        let direction = forward + right * (2.0 * across - 1.0) + up * (1.0 - 2.0 * down);
-        let ray = Ray::new(camera.origin.into(), direction.normalize());
+        let ray = ray_at(camera, [left + u * self.side, above + v * self.side], [0.0; 2]);
         let Some((eye, throughput)) = self.follow(ray, Passes::Specular)? else { return Ok(()) };
         seen.extend(importon(&eye, throughput));
         for _ in 0..GATHER_RAYS {

@@ -1,6 +1,5 @@
 use glam::Vec3;
-use photoncard_scene::{Camera, Environment, Scene, gltf};
-use photoncard_shared::message;
+use photoncard_scene::{Environment, Scene, gltf};
 
 use super::*;
 
@@ -16,11 +15,8 @@ fn house() -> Scene {
 
 /// Settings of small maps, for the camera of a scene or for any camera.
 fn settings(scene: &Scene, photons_for: PhotonsFor) -> PhotonSettings {
-    let Camera { origin, forward, right, up, vertical_fov, .. } = &scene.cameras[0];
-    let [right, up] = [right, up].map(|axis| (*axis * libm::tanf(0.5 * vertical_fov)).to_array());
-    let [origin, forward] = [origin, forward].map(Vec3::to_array);
     PhotonSettings {
-        camera: (photons_for == PhotonsFor::Camera).then_some(message::Camera { origin, forward, right, up }),
+        camera: (photons_for == PhotonsFor::Camera).then(|| scene.cameras[0].of_frame(1, 1)),
         caustic_photons: 0,
         caustic_neighbors: 50,
         seed: 3,

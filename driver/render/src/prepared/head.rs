@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::Vec3;
 use photoncard_map::pack::CardImage;
 use photoncard_map::photon_map::PhotonsFor;
-use photoncard_scene::{Camera, Scene};
+use photoncard_scene::{Camera, Lens, Projection, Scene};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::Checksum;
 use photoncard_shared::message::CausticGather;
@@ -140,21 +139,44 @@ struct StoredCamera {
     right: [f32; 3],
     up: [f32; 3],
     forward: [f32; 3],
-    vertical_fov: f32,
+    projection: StoredProjection,
+    shift: [f32; 2],
+    /// Radius and focus of the lens, metres.
+    lens: Option<[f32; 2]>,
     aspect: Option<f32>,
+}
+
+/// [`Projection`], as stored in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum StoredProjection {
+    VerticalFov(f32),
+    HalfHeight(f32),
+    Panorama([f32; 2]),
 }
 
 impl StoredCamera {
     fn new(camera: &Camera) -> Self {
-        let Camera { name, origin, right, up, forward, vertical_fov, aspect } = camera;
-        let [origin, right, up, forward] = [origin, right, up, forward].map(Vec3::to_array);
-        let (name, vertical_fov, aspect) = (name.clone(), *vertical_fov, *aspect);
-        Self { name, origin, right, up, forward, vertical_fov, aspect }
+        let Camera { name, origin, right, up, forward, projection, shift, lens, aspect } = camera.clone();
+        let [origin, right, up, forward] = [origin, right, up, forward].map(|vector| vector.to_array());
+        let projection = match projection {
+            Projection::Perspective { vertical_fov } => StoredProjection::VerticalFov(vertical_fov),
+            Projection::Orthographic { half_height } => StoredProjection::HalfHeight(half_height),
+            Projection::Panorama { angles } => StoredProjection::Panorama(angles),
+        };
+        let lens = lens.map(|Lens { radius, focus }| [radius, focus]);
+        Self { name, origin, right, up, forward, projection, shift, lens, aspect }
     }
 
     fn camera(self) -> Camera {
-        let Self { name, origin, right, up, forward, vertical_fov, aspect } = self;
+        let Self { name, origin, right, up, forward, projection, shift, lens, aspect } = self;
         let [origin, right, up, forward] = [origin, right, up, forward].map(Into::into);
-        Camera { name, origin, right, up, forward, vertical_fov, aspect }
+        let projection = match projection {
+            StoredProjection::VerticalFov(vertical_fov) => Projection::Perspective { vertical_fov },
+            StoredProjection::HalfHeight(half_height) => Projection::Orthographic { half_height },
+            StoredProjection::Panorama(angles) => Projection::Panorama { angles },
+        };
+        let lens = lens.map(|[radius, focus]| Lens { radius, focus });
+        Camera { name, origin, right, up, forward, projection, shift, lens, aspect }
     }
 }

@@ -1,12 +1,13 @@
 //! A prepared scene: card image, cameras and settings, which replace the scene file for renders.
 
 use std::collections::BTreeMap;
+use std::f32::consts::PI;
 
 use glam::Vec3;
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::PhotonsFor;
 use photoncard_picture::choice::Choice;
-use photoncard_scene::{Camera, Scene};
+use photoncard_scene::{Camera, Lens, Projection, Scene};
 use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
 
@@ -134,12 +135,21 @@ fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     }
 }
 
-/// Returns whether a camera is valid: finite, with a field of view above 0 and below pi.
+/// Returns whether a camera is valid: finite, with angles and lengths in their ranges.
 pub(super) fn is_camera(camera: &Camera) -> bool {
-    let Camera { name: _, origin, right, up, forward, vertical_fov, aspect } = camera;
+    let Camera { name: _, origin, right, up, forward, projection, shift, lens, aspect } = camera;
     let is_length = |length: f32| length.is_normal() && length > 0.0;
+    let is_angle = |angle: f32, most: f32| is_length(angle) && angle <= most;
+    let is_projection = match *projection {
+        Projection::Perspective { vertical_fov } => is_length(vertical_fov) && vertical_fov < PI,
+        Projection::Orthographic { half_height } => is_length(half_height),
+        Projection::Panorama { angles: [longitude, latitude] } => {
+            is_angle(longitude, 2.0 * PI) && is_angle(latitude, PI)
+        }
+    };
     [origin, right, up, forward].into_iter().all(|vector| Vec3::is_finite(*vector))
-        && is_length(*vertical_fov)
-        && *vertical_fov < std::f32::consts::PI
+        && is_projection
+        && shift.iter().all(|shift| shift.is_finite())
+        && lens.is_none_or(|Lens { radius, focus }| is_length(radius) && is_length(focus))
         && aspect.is_none_or(is_length)
 }

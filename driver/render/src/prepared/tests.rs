@@ -175,7 +175,7 @@ fn a_hostile_prepared_scene_is_refused() {
         assert!(refused(&hostile, lines).is_some(), "{name}");
     }
     let mut hostile = head.clone();
-    hostile["cameras"][0]["vertical_fov"] = json!(4.0);
+    hostile["cameras"][0]["projection"]["vertical_fov"] = json!(4.0);
     assert!(refused(&hostile, lines).is_some());
     // Card images with a wrong section, length or layout, and a right checksum.
     for (place, value) in [(8, 99), (12, 1), (70, 255), (0, 0)] {

@@ -349,7 +349,7 @@ impl<'a> Pilot<'a> {
         let go_on = |_| !observer.is_stopped();
         let traced = TracedPhotons::new(packed, &photons, &go_on)?;
         let is_open = settings.photons.photons_for == PhotonsFor::Auto;
-        let camera = settings.pinhole(&settings.camera(scene)?);
+        let camera = settings.frame_camera(&settings.camera(scene)?);
         let used_share = is_open.then(|| traced.used_share(packed, &camera)).transpose()?;
         let mapped = map_traced(packed.clone(), traced, &photons, &go_on)?;
         let has_caustics = of_picture.caustic_photons > 0;

@@ -1,8 +1,9 @@
-//! Camera of the picture: the scene's camera, unless the settings move, turn or zoom it.
+//! Camera of the picture: the scene's camera, unless the settings move, turn or project it otherwise.
 
 use glam::{DVec3, Vec3};
-use photoncard_scene::error::SceneError;
-use photoncard_scene::{Camera, Scene};
+use photoncard_firmware::scene::Ray;
+use photoncard_firmware::scene::camera::{depth_per_distance, ray_at};
+use photoncard_scene::{Aperture, Camera, Projection, Scene};
 
 use super::{Picture, RenderSettings};
 use crate::error::RenderError;
@@ -11,35 +12,120 @@ use crate::error::RenderError;
 const VERTICAL: f64 = 1e-6;
 
 impl RenderSettings {
-    /// Determines the camera of the picture. [`Picture::camera_at`], [`Picture::look_at`] and
-    /// [`Picture::fov`] each replace a property of the scene's camera; its other properties stay.
+    /// Determines the camera of the picture. [`Picture::camera_at`], [`Picture::look_at`], the three
+    /// projections, [`Picture::shift`] and the lens each replace a property of the scene's camera; its other
+    /// properties stay.
     ///
     /// # Errors
     /// If the scene has no camera with this name, or the values are not valid for a camera.
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
-        let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
-        // If position and direction are stated, no property of an orthographic camera is used, and the first
-        // camera can replace it.
-        let is_placed = self.picture.states_view();
-        let found = match (scene.camera(camera.as_deref()), scene.cameras.first()) {
-            (Err(SceneError::OrthographicCamera { .. }), Some(other)) if is_placed => other,
-            (found, _) => found?,
-        };
-        let mut camera = found.clone();
+        let Picture { camera, camera_at, look_at, .. } = &self.picture;
+        let mut camera = scene.camera(camera.as_deref())?.clone();
         if let Some(at) = camera_at {
             camera.origin = placed("picture.camera_at", *at, scene)?;
         }
+        let mut distance = None;
         if let Some(target) = look_at {
             let target = placed("picture.look_at", *target, scene)?;
-            let forward = (target.as_dvec3() - camera.origin.as_dvec3()).try_normalize();
-            let forward = forward.ok_or_else(|| at_the_camera(scene.in_file(target)))?;
+            let view = target.as_dvec3() - camera.origin.as_dvec3();
+            let forward = view.try_normalize().ok_or_else(|| at_the_camera(scene.in_file(target)))?;
             [camera.right, camera.up, camera.forward] = upright(forward).map(DVec3::as_vec3);
+            distance = Some(view.length() as f32);
         }
-        if let Some(degrees) = *fov {
-            camera.vertical_fov = field_of_view(degrees)?;
-        }
+        self.picture.project(&mut camera)?;
+        self.picture.focus(&mut camera, distance)?;
         Ok(camera)
     }
+}
+
+impl RenderSettings {
+    /// Point in the scene's coordinates that the middle of pixel `[column, row]` shows at a depth, metres
+    /// (layer `Z`), through the middle of the lens.
+    pub fn seen_point(&self, camera: &Camera, [column, row]: [u32; 2], depth: f32) -> Vec3 {
+        let Picture { width, height, .. } = self.picture;
+        let place = [(column, width), (row, height)].map(|(at, side)| (at as f32 + 0.5) / side as f32);
+        let camera = self.frame_camera(camera);
+        let Ray { origin, direction, .. } = ray_at(&camera, place, [0.0; 2]);
+        origin + direction * (depth / depth_per_distance(&camera, direction))
+    }
+}
+
+impl Picture {
+    /// Sets the stated projection and lens shift. A lens or shift that the projection cannot have is removed.
+    fn project(&self, camera: &mut Camera) -> Result<(), RenderError> {
+        let Self { fov, orthographic, panorama, shift, .. } = *self;
+        let replaced = match (fov, orthographic, panorama) {
+            (None, None, None) => None,
+            (Some(degrees), None, None) => Some(Projection::perspective(field_of_view(degrees)?)),
+            (None, Some(height), None) => Some(Projection::orthographic(height).map_err(|reason| {
+                refused("picture.orthographic", &height, reason, "give metres, such as 3")
+            })?),
+            (None, None, Some(degrees)) => Some(Projection::panorama(degrees).map_err(|reason| {
+                let value = format!("{},{}", degrees[0], degrees[1]);
+                refused("picture.panorama", &value, reason, "give 360,180 or 180,180")
+            })?),
+            _ => {
+                let [reason, remedy] = ["a picture has one projection", "state one of them"];
+                let field = if panorama.is_some() { "picture.panorama" } else { "picture.orthographic" };
+                return Err(refused(field, &"with another projection", reason.into(), remedy));
+            }
+        };
+        if let Some(projection) = replaced {
+            camera.projection = projection;
+            camera.aspect = panorama.map(|[longitude, latitude]| longitude / latitude).or(camera.aspect);
+            if camera.vertical_fov().is_none() {
+                camera.lens = None;
+            }
+            if panorama.is_some() {
+                camera.shift = [0.0; 2];
+            }
+        }
+        if let Some(shift) = shift {
+            camera.set_shift(shift).map_err(|reason| {
+                let value = format!("{},{}", shift[0], shift[1]);
+                refused("picture.shift", &value, reason, "give parts of the longer side, such as 0,0.2")
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Sets the stated lens. `distance` is that of [`Self::look_at`], metres.
+    fn focus(&self, camera: &mut Camera, distance: Option<f32>) -> Result<(), RenderError> {
+        let Self { aperture, focus, width, height, .. } = *self;
+        let own = camera.lens;
+        let Some(aperture) = aperture.or(own.map(|lens| Aperture::Diameter(2.0 * lens.radius))) else {
+            return match focus {
+                None => Ok(()),
+                Some(focus) => {
+                    let reason = "a pinhole is in focus everywhere".into();
+                    Err(refused("picture.focus", &focus, reason, "give an aperture too, such as f/2.8"))
+                }
+            };
+        };
+        let Some(focus) = focus.or(own.map(|lens| lens.focus)).or(distance) else {
+            let reason = "a lens needs a distance in focus".into();
+            return Err(refused(
+                "picture.aperture",
+                &aperture,
+                reason,
+                "give the focus in metres, such as 2.5",
+            ));
+        };
+        let aspect = width as f32 / height as f32;
+        camera.set_lens(aperture, focus, aspect).map_err(|reason| {
+            let field = if self.aperture.is_some() { "picture.aperture" } else { "picture.focus" };
+            refused(
+                field,
+                &aperture,
+                reason,
+                "give a perspective camera, an aperture such as f/2.8, and a focus in metres",
+            )
+        })
+    }
+}
+
+fn refused(field: &'static str, value: &impl ToString, reason: String, remedy: &'static str) -> RenderError {
+    RenderError::Setting { field, value: value.to_string(), reason, remedy: remedy.into() }
 }
 
 /// Right, up and forward vectors of an upright camera: up is in the plane of the direction `forward` and +y.
@@ -59,12 +145,8 @@ fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
     if half > 0.0 && half.is_finite() && radians < std::f32::consts::PI {
         return Ok(radians);
     }
-    Err(RenderError::Setting {
-        field: "picture.fov",
-        value: degrees.to_string(),
-        reason: "a vertical field of view is above 0 and below 180 degrees".into(),
-        remedy: "give a number such as 40".into(),
-    })
+    let reason = "a vertical field of view is above 0 and below 180 degrees".into();
+    Err(refused("picture.fov", &degrees, reason, "give a number such as 40"))
 }
 
 /// Converts coordinates of the scene's file to a position in the scene.
@@ -74,22 +156,14 @@ fn placed(field: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, R
     if placed.is_finite() {
         return Ok(placed);
     }
-    Err(RenderError::Setting {
-        field,
-        value: place.to_string(),
-        reason: "a place is three finite numbers of metres".into(),
-        remedy: "give X,Y,Z, such as 0,1.5,4".into(),
-    })
+    let reason = "a place is three finite numbers of metres".into();
+    Err(refused(field, &place, reason, "give X,Y,Z, such as 0,1.5,4"))
 }
 
 fn at_the_camera(target: DVec3) -> RenderError {
     let [x, y, z] = target.to_array();
-    RenderError::Setting {
-        field: "picture.look_at",
-        value: format!("{x},{y},{z}"),
-        reason: "the camera itself is there".into(),
-        remedy: "give another place, or move the camera by `picture.camera_at`".into(),
-    }
+    let remedy = "give another place, or move the camera by `picture.camera_at`";
+    refused("picture.look_at", &format!("{x},{y},{z}"), "the camera itself is there".into(), remedy)
 }
 
 #[cfg(test)]
@@ -97,15 +171,8 @@ mod tests {
     use super::*;
 
     fn scene() -> Scene {
-        let camera = Camera {
-            name: "eye".to_owned(),
-            origin: Vec3::new(1.0, 2.0, 3.0),
-            right: Vec3::Y,
-            up: Vec3::NEG_X,
-            forward: Vec3::NEG_Z,
-            vertical_fov: 1.0,
-            aspect: Some(1.5),
-        };
+        let axes = [Vec3::Y, Vec3::NEG_X, Vec3::NEG_Z];
+        let camera = Camera::perspective("eye", Vec3::new(1.0, 2.0, 3.0), axes, 1.0, Some(1.5));
         Scene::default().with(|scene| scene.cameras = vec![camera])
     }
 
@@ -120,7 +187,10 @@ mod tests {
         let moved = camera(|picture| picture.camera_at = Some([4.0, 5.0, 6.0])).unwrap();
         assert_eq!(moved, Camera { origin: Vec3::new(4.0, 5.0, 6.0), ..own.clone() });
         let zoomed = camera(|picture| picture.fov = Some(60.0)).unwrap();
-        assert_eq!(zoomed, Camera { vertical_fov: 60_f32.to_radians(), ..own.clone() });
+        assert_eq!(
+            zoomed,
+            Camera { projection: Projection::perspective(60_f32.to_radians()), ..own.clone() }
+        );
         let turned = camera(|picture| picture.look_at = Some([4.0, 2.0, 3.0])).unwrap();
         assert_eq!(turned, Camera { right: Vec3::Z, up: Vec3::Y, forward: Vec3::X, ..own });
     }

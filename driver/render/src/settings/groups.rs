@@ -7,6 +7,7 @@ use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::{PhotonLayout, PhotonsFor};
 use photoncard_picture::film::Window;
 use photoncard_picture::layer::Layers;
+use photoncard_scene::Aperture;
 use photoncard_shared::message::{Filter, Radiance, Sampling};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -37,8 +38,21 @@ pub struct Picture {
     /// Point at which the camera looks, in the coordinates of the scene's file, metres; +y is up in the
     /// picture. `None` for the camera's own direction.
     pub look_at: Option<[f64; 3]>,
-    /// Vertical field of view, degrees; `None` for the camera's own.
+    /// Vertical field of view of a perspective picture, degrees; `None` for the camera's own projection. At
+    /// most one of `fov`, `orthographic` and `panorama` can be stated.
     pub fov: Option<f32>,
+    /// Height that an orthographic picture shows, metres; `None` for the camera's own projection.
+    pub orthographic: Option<f32>,
+    /// Longitudes and latitudes that an equirectangular panorama shows, degrees; `None` for the camera's own
+    /// projection.
+    pub panorama: Option<[f32; 2]>,
+    /// Lens shift ([`Camera::shift`](photoncard_scene::Camera)); `None` for the camera's own.
+    pub shift: Option<[f32; 2]>,
+    /// Opening of the lens; `None` for the camera's own.
+    pub aperture: Option<Aperture>,
+    /// Distance of the plane in focus, metres; `None` for the camera's own or, if it has no lens, the
+    /// distance of [`Self::look_at`].
+    pub focus: Option<f32>,
     /// Layers of the picture in addition to radiance.
     pub layers: Layers,
     /// Pixel filter.
@@ -58,7 +72,24 @@ impl Picture {
     }
 
     pub(super) fn options(&self) -> Vec<Setting> {
-        let Self { width, height, crop, camera, camera_at, look_at, fov, layers, filter } = self;
+        let Self {
+            width,
+            height,
+            crop,
+            camera,
+            camera_at,
+            look_at,
+            fov,
+            orthographic,
+            panorama,
+            shift,
+            aperture,
+            focus,
+            layers,
+            filter,
+        } = self;
+        let pair = |numbers: Option<[f32; 2]>| (Some(json!(numbers)), numbers.map(|numbers| list(&numbers)));
+        let aperture = aperture.map(|aperture| aperture.to_string());
         let size = (Some(json!([width, height])), Some(format!("{width}x{height}")));
         let Window { x0, x1, y0, y1 } = self.window();
         let window = [x0, x1, y0, y1];
@@ -72,6 +103,11 @@ impl Picture {
             setting(Pixels, "picture.camera_at", "camera-at", place(*camera_at)),
             setting(Pixels, "picture.look_at", "look-at", place(*look_at)),
             setting(Pixels, "picture.fov", "fov", optional(*fov)),
+            setting(Pixels, "picture.orthographic", "orthographic", optional(*orthographic)),
+            setting(Pixels, "picture.panorama", "panorama", pair(*panorama)),
+            setting(Pixels, "picture.shift", "shift", pair(*shift)),
+            setting(Pixels, "picture.aperture", "aperture", optional(aperture)),
+            setting(Pixels, "picture.focus", "focus", optional(*focus)),
             setting(Pixels, "picture.layers", "aov", aov),
             setting(Pixels, "picture.filter", "filter", name(*filter)),
         ]
@@ -88,6 +124,11 @@ impl Default for Picture {
             camera_at: None,
             look_at: None,
             fov: None,
+            orthographic: None,
+            panorama: None,
+            shift: None,
+            aperture: None,
+            focus: None,
             layers: Layers::default(),
             filter: Filter::Box,
         }

@@ -6,7 +6,6 @@ mod dependence;
 mod groups;
 mod setting;
 
-use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::Budget;
@@ -141,7 +140,7 @@ impl RenderSettings {
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
             PhotonsFor::Scene | PhotonsFor::Auto => None,
-            PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.pinhole(&camera)),
+            PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.frame_camera(&camera)),
         };
         PhotonSettings {
             camera,
@@ -173,6 +172,11 @@ impl RenderSettings {
             && self.cards.verify.is_none()
     }
 
+    /// The camera of the picture's frames.
+    pub(crate) fn frame_camera(&self, camera: &Camera) -> message::Camera {
+        camera.of_frame(self.picture.width, self.picture.height)
+    }
+
     /// Frame parameters for a camera of the scene.
     pub fn frame(
         &self,
@@ -183,7 +187,7 @@ impl RenderSettings {
         FrameParameters {
             width: self.picture.width,
             height: self.picture.height,
-            camera: self.pinhole(camera),
+            camera: self.frame_camera(camera),
             seed: self.integrator.seed,
             first_sample: 0,
             samples: self.integrator.samples,
@@ -206,26 +210,13 @@ impl RenderSettings {
             adaptive_threshold: self.integrator.adaptive_threshold,
         }
     }
-
-    /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows
-    /// from the picture's aspect ratio.
-    pub(crate) fn pinhole(&self, camera: &Camera) -> message::Camera {
-        let half_height = libm::tanf(0.5 * camera.vertical_fov);
-        let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;
-        let scaled = |axis: Vec3, length: f32| (axis * length).to_array();
-        message::Camera {
-            origin: camera.origin.to_array(),
-            forward: camera.forward.to_array(),
-            right: scaled(camera.right, half_width),
-            up: scaled(camera.up, half_height),
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use photoncard_firmware::kind::{MICRO, REFERENCE};
 
+    use glam::Vec3;
     use photoncard_picture::layer::Layers;
 
     use super::*;
@@ -257,8 +248,7 @@ mod tests {
     fn photons_for_the_scene_depend_on_no_camera() {
         let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
         let seen_from = |origin: Vec3| {
-            let name = "camera".to_owned();
-            let camera = Camera { name, origin, right, up, forward, vertical_fov: 1.0, aspect: None };
+            let camera = Camera::perspective("camera", origin, [right, up, forward], 1.0, None);
             Scene::default().with(|scene| scene.cameras = vec![camera])
         };
         for (photons_for, is_of_camera) in [(PhotonsFor::Scene, false), (PhotonsFor::Camera, true)] {

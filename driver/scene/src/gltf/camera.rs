@@ -3,14 +3,15 @@
 use std::collections::BTreeSet;
 
 use glam::{DMat4, DVec3, Vec3};
-use gltf::json::camera::Type;
+use gltf::json::camera::{Orthographic, Type};
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 
 use super::document::Document;
+use super::extras;
 use super::inside::{self, Framed};
-use super::notices::Notices;
 use crate::error::SceneError;
-use crate::{Camera, FRAMED, Scene};
+use crate::{Camera, FRAMED, Projection, Scene};
 
 /// Width of the default camera's view, in units of the scene's width or height, whichever is larger.
 const MARGIN: f32 = 1.05;
@@ -20,6 +21,49 @@ const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 
 /// Vertical field of view of a default camera inside a room: 65 degrees, in radians.
 const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
+
+/// Properties of a camera under the key `photoncard` of its `extras`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Extras {
+    /// [`Camera::shift`].
+    shift: Option<[f32; 2]>,
+    /// Diameter in metres, or an f-number such as `f/2.8`.
+    aperture: Option<Opening>,
+    /// [`Lens::focus`], metres.
+    focus: Option<f32>,
+    /// Angles of longitude and latitude, degrees.
+    panorama: Option<[f32; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Opening {
+    Diameter(f32),
+    Text(String),
+}
+
+impl Extras {
+    /// Changes a camera.
+    ///
+    /// # Errors
+    /// The reason why the properties are not possible.
+    fn apply(self, camera: &mut Camera) -> Result<(), String> {
+        let Self { shift, aperture, focus, panorama } = self;
+        if let Some(degrees) = panorama {
+            (camera.projection, camera.aspect) =
+                (Projection::panorama(degrees)?, Some(degrees[0] / degrees[1]));
+        }
+        camera.set_shift(shift.unwrap_or_default())?;
+        let aperture = match aperture {
+            None => return Ok(()),
+            Some(Opening::Diameter(diameter)) => diameter.to_string().parse()?,
+            Some(Opening::Text(text)) => text.parse()?,
+        };
+        let focus = focus.ok_or("an aperture needs a focus")?;
+        camera.set_lens(aperture, focus, camera.aspect.unwrap_or(1.0))
+    }
+}
 
 /// Converts the file's cameras to those of the scene, under unique names.
 pub(super) struct CameraPlacer<'a> {
@@ -39,36 +83,71 @@ impl<'a> CameraPlacer<'a> {
         node: usize,
         world: &DMat4,
         scene: &mut Scene,
-        notices: &mut Notices,
     ) -> Result<(), SceneError> {
         let document = self.document;
-        let source = &document.root.cameras[index];
         let name = self.name(index, node);
-        let (Checked::Valid(Type::Perspective), Some(perspective)) = (source.type_, &source.perspective)
-        else {
-            let before = scene.cameras.len();
-            scene.orthographic.push((before, name.clone()));
-            notices.orthographic.push(name);
-            return Ok(());
-        };
-        let item = |field| format!("cameras[{index}].perspective.{field}");
-        let vertical_fov = perspective.yfov;
-        if !(vertical_fov > 0.0 && vertical_fov < std::f32::consts::PI) {
-            let reason = format!("a vertical field of view of {vertical_fov} radians is not possible");
-            return Err(document.invalid(item("yfov"), reason, "state an angle between 0 and pi"));
-        }
-        let aspect = perspective.aspect_ratio;
-        if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite())) {
-            let reason = format!("an aspect ratio of {aspect} is not possible");
-            return Err(document.invalid(item("aspectRatio"), reason, "state width over height, above 0"));
-        }
+        let (projection, aspect) = self.projection(index)?;
         let (origin, right, up, forward) = axes(world).ok_or_else(|| {
             let reason = "the transform of the camera's node, with that of its parents, cannot be inverted";
             let remedy = "give the camera's node and its parents a finite scale other than 0";
             document.invalid(format!("nodes[{node}]"), reason, remedy)
         })?;
-        scene.cameras.push(Camera { name, origin, right, up, forward, vertical_fov, aspect });
+        let (shift, lens) = ([0.0; 2], None);
+        let mut camera = Camera { name, origin, right, up, forward, projection, shift, lens, aspect };
+        if let Some(extras) = self.extras(index)? {
+            extras.apply(&mut camera).map_err(|reason| self.invalid_extras(index, reason))?;
+        }
+        scene.cameras.push(camera);
         Ok(())
+    }
+
+    /// Projection and aspect ratio of a camera, by glTF's own properties.
+    fn projection(&self, index: usize) -> Result<(Projection, Option<f32>), SceneError> {
+        let source = &self.document.root.cameras[index];
+        let invalid = |field: &str, reason: String, remedy| {
+            Err(self.document.invalid(format!("cameras[{index}].{field}"), reason, remedy))
+        };
+        if let (Checked::Valid(Type::Orthographic), Some(Orthographic { xmag, ymag, .. })) =
+            (source.type_, &source.orthographic)
+        {
+            // Some exporters state mirrored extents.
+            let [half_width, half_height] = [xmag, ymag].map(|extent| extent.abs());
+            let aspect = half_width / half_height;
+            for (field, extent, ratio) in [("ymag", half_height, 1.0), ("xmag", half_width, aspect)] {
+                if !(extent.is_normal() && ratio.is_normal()) {
+                    let reason = format!("half an extent of {extent} m is not possible");
+                    return invalid(&format!("orthographic.{field}"), reason, "state metres above 0");
+                }
+            }
+            return Ok((Projection::Orthographic { half_height }, Some(aspect)));
+        }
+        let Some(perspective) = &source.perspective else {
+            let reason = "the camera states no projection".into();
+            return invalid("type", reason, "state perspective or orthographic, and its properties");
+        };
+        let vertical_fov = perspective.yfov;
+        if !(vertical_fov > 0.0 && vertical_fov < std::f32::consts::PI) {
+            let reason = format!("a vertical field of view of {vertical_fov} radians is not possible");
+            return invalid("perspective.yfov", reason, "state an angle between 0 and pi");
+        }
+        let aspect = perspective.aspect_ratio;
+        if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite())) {
+            let reason = format!("an aspect ratio of {aspect} is not possible");
+            return invalid("perspective.aspectRatio", reason, "state width over height, above 0");
+        }
+        Ok((Projection::Perspective { vertical_fov }, aspect))
+    }
+
+    /// Properties of a camera that glTF lacks.
+    fn extras(&self, index: usize) -> Result<Option<Extras>, SceneError> {
+        let source = &self.document.root.cameras[index];
+        extras::read(&source.extras).map_err(|reason| self.invalid_extras(index, reason))
+    }
+
+    fn invalid_extras(&self, index: usize, reason: String) -> SceneError {
+        let item = format!("cameras[{index}].extras.photoncard");
+        let remedy = r#"state some of {"photoncard": {"shift": [x, y], "aperture": "f/2.8", "focus": metres, "panorama": [360, 180]}}"#;
+        self.document.invalid(item, reason, remedy)
     }
 
     /// Unique name of the camera: its own, else that of its node, else `camera N`.
@@ -102,7 +181,8 @@ pub(super) fn frame(scene: &Scene) -> (Camera, Framed) {
     match inside::view(scene) {
         Some((origin, forward)) => {
             let right = forward.cross(Vec3::Y);
-            let camera = Camera { origin, right, forward, vertical_fov: WIDE_VIEW, ..from_front(scene) };
+            let projection = Projection::perspective(WIDE_VIEW);
+            let camera = Camera { origin, right, forward, projection, ..from_front(scene) };
             (camera, Framed::FromInside)
         }
         None => (from_front(scene), Framed::FromFront),
@@ -117,13 +197,6 @@ fn from_front(scene: &Scene) -> Camera {
     let half = (high - low) * 0.5;
     let vertical_fov = std::f32::consts::FRAC_PI_4;
     let distance = MARGIN * half.x.max(half.y).max(0.01 * half.z) / HALF_VIEW_TANGENT;
-    Camera {
-        name: FRAMED.to_owned(),
-        origin: Vec3::new(centre.x, centre.y, high.z + distance),
-        right: Vec3::X,
-        up: Vec3::Y,
-        forward: Vec3::NEG_Z,
-        vertical_fov,
-        aspect: None,
-    }
+    let origin = Vec3::new(centre.x, centre.y, high.z + distance);
+    Camera::perspective(FRAMED, origin, [Vec3::X, Vec3::Y, Vec3::NEG_Z], vertical_fov, None)
 }

@@ -7,17 +7,12 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::document::Document;
+use super::extras;
 use super::layers::{self, has_other_layer};
 use super::texture::{Textures, Use};
 use crate::error::SceneError;
 use crate::out_of_range::{OutOfRange, Property};
 use crate::{Material, Reflection, Transmission};
-
-/// Keys of `extras` that this renderer reads. Others belong to other programs.
-#[derive(Deserialize)]
-struct Extras {
-    photoncard: Option<Photoncard>,
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -234,21 +229,12 @@ fn read_phong(
     source: &json::Material,
     name: &str,
 ) -> Result<Option<Phong>, SceneError> {
-    let Some(extras) = &source.extras else { return Ok(None) };
-    // `extras` may be of any type; only an object can hold this renderer's key.
-    if !extras.get().trim_start().starts_with('{') {
-        return Ok(None);
-    }
-    let extras: Extras = serde_json::from_str(extras.get()).map_err(|error| {
-        // The message's line and column refer to `extras`, not to the file, and are cut off.
-        let message = error.to_string();
-        let message = message.split(" at line ").next().unwrap_or_default();
-        SceneError::Material {
+    let photoncard: Option<Photoncard> =
+        extras::read(&source.extras).map_err(|reason| SceneError::Material {
             location: document.location(format!("materials[{index}].extras.photoncard")),
             material: name.to_owned(),
-            reason: message.to_owned(),
+            reason,
             remedy: r#"state it as {"photoncard": {"phong": {"specular": [r, g, b], "exponent": n}}}"#,
-        }
-    })?;
-    Ok(extras.photoncard.and_then(|photoncard| photoncard.phong))
+        })?;
+    Ok(photoncard.and_then(|photoncard| photoncard.phong))
 }

@@ -13,6 +13,7 @@ mod document;
 mod draco;
 mod extensions;
 mod extent;
+mod extras;
 mod files;
 mod image;
 mod inside;

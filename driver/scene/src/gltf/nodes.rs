@@ -69,10 +69,10 @@ pub(super) fn cameras(
     anchor: Option<&Anchor>,
 ) -> Result<Vec<Camera>, SceneError> {
     let mut placer = CameraPlacer::new(document);
-    let (mut scene, mut notices) = (Scene::default(), Notices::default());
+    let mut scene = Scene::default();
     for (index, world) in walk(document, poses, anchor)? {
         if let Some(camera) = document.root.nodes[index].camera {
-            placer.place(camera.value(), index, &world, &mut scene, &mut notices)?;
+            placer.place(camera.value(), index, &world, &mut scene)?;
         }
     }
     Ok(std::mem::take(&mut scene.cameras))
@@ -140,7 +140,7 @@ impl<'a> Placer<'a> {
             }
         }
         if let Some(camera) = node.camera {
-            self.cameras.place(camera.value(), index, &world, scene, notices)?;
+            self.cameras.place(camera.value(), index, &world, scene)?;
         }
         let extensions = node.extensions.as_ref();
         if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {

@@ -24,8 +24,6 @@ const LISTED: usize = 8;
 /// Facts for notices that are collected during loading. Other notices follow from the JSON alone.
 #[derive(Default)]
 pub(super) struct Notices {
-    /// Names of orthographic cameras.
-    pub(super) orthographic: Vec<String>,
     /// Names of glass materials that were made solid or thin-walled contrary to what the file states.
     pub(super) glass: Resolved,
     /// Names of solid glass materials with coinciding faces that cannot be joined.
@@ -188,7 +186,6 @@ impl Notices {
                 "animation",
                 &without_target,
             ),
-            (Concern::OtherCameras, "orthographic cameras are not rendered", "camera", &self.orthographic),
         ] {
             if !names.is_empty() {
                 sentences.push((Some(concern), format!("{sentence}: {}", list(kind, names))));
@@ -215,7 +212,7 @@ impl Notices {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
             sentences.push((concern_of(&extension), format!("the extension {extension} is ignored{places}")));
         }
-        if let Some(view) = self.framed.filter(|_| self.orthographic.is_empty()) {
+        if let Some(view) = self.framed {
             let framed = match view {
                 Framed::FromFront => "the scene has no camera: it is framed from the front (+z)",
                 Framed::FromInside => "the scene has no camera: it is a closed room, framed from inside",

@@ -1,8 +1,10 @@
 //! Files that glTF 2.0 allows but the types of the `gltf` crate reject are loaded; invalid ones are refused
 //! with their JSON path.
 
+use glam::Vec3;
 use photoncard_scene::error::SceneError;
-use photoncard_scene::{Concern, Scene};
+use photoncard_scene::{Concern, Lens, Projection, Scene};
+use photoncard_shared::message;
 use serde_json::{Value, json};
 
 use crate::support::{glb, load_bytes, load_changed, load_with, push, triangle_bytes, triangle_json};
@@ -201,39 +203,68 @@ fn files_of_other_kinds_are_recognised_with_a_command() {
     assert!(address.contains("curl -L -o duck.glb 'https://example.org/a/duck.glb?v=1'"), "{address}");
 }
 
+/// A file with one camera, whose object is `camera`.
+fn of_camera(camera: Value) -> Result<Scene, SceneError> {
+    let mut json = triangle_json();
+    json["cameras"][0] = camera;
+    load_with(&json, &triangle_bytes())
+}
+
 #[test]
-fn an_orthographic_camera_is_refused_as_the_view() {
-    let flat = |json: &mut Value, node: usize| {
-        let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
-        let camera = json!({"name": "flat", "type": "orthographic", "orthographic": orthographic});
-        let camera = push(json, "cameras", camera);
-        json["nodes"][node]["camera"] = json!(camera);
+fn an_orthographic_camera_shows_its_extents() {
+    let of_extents = |xmag: f32, ymag: f32| {
+        let extents = json!({"xmag": xmag, "ymag": ymag, "znear": 0.1, "zfar": 9});
+        of_camera(json!({"name": "plan", "type": "orthographic", "orthographic": extents}))
     };
-    let scene = loaded(|json| flat(json, 0));
-    for name in [None, Some("flat")] {
-        let Err(SceneError::OrthographicCamera { name: found, remedy }) = scene.camera(name) else {
-            panic!("{name:?} is seen by")
-        };
-        assert!(found == "flat" && remedy.contains("'eye'") && remedy.contains("--camera-at"), "{remedy}");
+    for (xmag, ymag) in [(3.0, 1.5), (-3.0, 1.5), (3.0, -1.5)] {
+        let camera = of_extents(xmag, ymag).unwrap().cameras.remove(0);
+        assert_eq!(camera.projection, Projection::Orthographic { half_height: 1.5 });
+        assert_eq!((camera.origin, camera.size(512)), (Vec3::new(0.25, 0.25, 3.0), Some((512, 256))));
+        let message::Camera { right, up, projection, .. } = camera.of_frame(512, 256);
+        assert_eq!((right, up), ([3.0, 0.0, 0.0], [0.0, 1.5, 0.0]));
+        assert_eq!(projection, message::Projection::Orthographic);
     }
-    assert_eq!(scene.camera(Some("eye")).unwrap().name, "eye");
-    let behind = loaded(|json| {
-        push(json, "nodes", json!({}));
-        push(&mut json["scenes"][0], "nodes", json!(2));
-        flat(json, 2);
-    });
-    assert_eq!(behind.camera(None).unwrap().name, "eye");
-    let alone = load_with(
-        &{
-            let mut json = triangle_json();
-            flat(&mut json, 1);
-            json
-        },
-        &triangle_bytes(),
-    );
-    let alone = alone.unwrap();
-    assert!(matches!(alone.camera(None), Err(SceneError::OrthographicCamera { .. })));
-    assert!(alone.notices.iter().all(|notice| !notice.contains("framed")), "{:?}", alone.notices);
+    for (xmag, ymag, field) in [(0.0, 1.0, "xmag"), (1.0, 0.0, "ymag"), (1e38, 1e-38, "")] {
+        let error = of_extents(xmag, ymag).unwrap_err().to_string();
+        assert!(error.contains("cameras[0].orthographic") && error.contains(field), "{error}");
+    }
+}
+
+#[test]
+fn extras_of_a_camera_state_what_gltf_lacks() {
+    let of_extras = |extras: Value| {
+        let perspective = json!({"yfov": 1.0, "znear": 0.1, "aspectRatio": 2.0});
+        let camera = json!({"type": "perspective", "perspective": perspective, "extras": extras});
+        of_camera(camera).map(|mut scene| scene.cameras.remove(0))
+    };
+    for extras in [json!(null), json!(3), json!({"other": {"shift": 1}}), json!({"photoncard": {}})] {
+        let camera = of_extras(extras).unwrap();
+        assert_eq!((camera.shift, camera.lens), ([0.0; 2], None));
+    }
+    let camera =
+        of_extras(json!({"photoncard": {"shift": [0.1, -0.2], "aperture": 0.02, "focus": 2.5}})).unwrap();
+    assert_eq!((camera.shift, camera.lens), ([0.1, -0.2], Some(Lens { radius: 0.01, focus: 2.5 })));
+    // A quarter of 36 mm is half the height of the sensor; f/2 opens half of the focal length.
+    let radius = 0.25 * 0.009 / 0.5_f32.tan();
+    let Lens { radius: found, .. } =
+        of_extras(json!({"photoncard": {"aperture": "f/2", "focus": 1}})).unwrap().lens.unwrap();
+    assert!((found / radius - 1.0).abs() < 1e-6, "{found} {radius}");
+    let around = of_extras(json!({"photoncard": {"panorama": [360, 180]}})).unwrap();
+    assert_eq!((around.projection.name(), around.size(512)), ("panorama", Some((512, 256))));
+    for (extras, part) in [
+        (json!({"aperture": "f/0", "focus": 1}), "f/2.8"),
+        (json!({"aperture": -1, "focus": 1}), "f/2.8"),
+        (json!({"aperture": 0.01}), "focus"),
+        (json!({"aperture": 0.01, "focus": 0}), "above 0"),
+        (json!({"panorama": [400, 180]}), "360"),
+        (json!({"panorama": [360, 180], "shift": [0.1, 0]}), "no lens shift"),
+        (json!({"panorama": [360, 180], "aperture": 0.1, "focus": 1}), "perspective"),
+        (json!({"shift": [0.1]}), "length"),
+        (json!({"sift": [0.1, 0.2]}), "sift"),
+    ] {
+        let error = of_extras(json!({"photoncard": extras})).unwrap_err().to_string();
+        assert!(error.contains("cameras[0].extras.photoncard") && error.contains(part), "{error}");
+    }
 }
 
 /// Loads a scene of this text, with the bytes of the triangle beside it.

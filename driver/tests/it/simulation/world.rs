@@ -36,15 +36,8 @@ fn scene() -> Scene {
         quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0, 0),
         quad(Vec3::new(-0.3, 0.9, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6, 1),
     ];
-    let camera = Camera {
-        name: "camera".into(),
-        origin: Vec3::new(0.0, 0.0, 2.0),
-        right: Vec3::X,
-        up: Vec3::Y,
-        forward: Vec3::NEG_Z,
-        vertical_fov: 1.0,
-        aspect: None,
-    };
+    let camera =
+        Camera::perspective("camera", Vec3::new(0.0, 0.0, 2.0), [Vec3::X, Vec3::Y, Vec3::NEG_Z], 1.0, None);
     Scene::from(SceneContents {
         triangles: quads.concat(),
         materials: vec![material(0.7, 0.0), material(0.0, 5.0)],

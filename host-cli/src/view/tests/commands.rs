@@ -9,7 +9,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use super::random::Random;
 use crate::arguments::{Arguments, Command, RenderOptions, ViewOptions};
 use crate::view::command_line::{quoted, words};
-use crate::view::request::Setting;
+use crate::view::request::{Extent, Setting, View};
 use crate::view::wish::Wish;
 
 /// Parses the arguments of `photoncard view`.
@@ -101,7 +101,16 @@ fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
     for _ in 0..random.below(6) {
         let mut place = |reach: f32| [(); 3].map(|()| f64::from(random.number(reach)));
         match place(1.0)[0] {
-            change if change < -0.4 => wish.look(place(1e3), place(1e-6), place(1.0)[0].abs() as f32 * 90.0),
+            change if change < -0.4 => {
+                let [size, longitude, latitude] = place(1.0).map(|size| size.abs() as f32);
+                let shown = match change {
+                    change if change < -0.8 => Extent::Angles([360.0 * longitude, 180.0 * latitude]),
+                    change if change < -0.6 => Extent::Height(size),
+                    _ => Extent::Fov(90.0 * size),
+                };
+                let camera = (size < 0.5).then(|| "a camera".into());
+                wish.look(View { camera, position: place(1e3), look_at: place(1e-6), shown });
+            }
             change if change < 0.0 => wish.set("lamp \"x\".emission".into(), place(1e20).to_vec()),
             change if change < 0.2 => wish.set("a.exponent".into(), vec![place(1e-20)[0].abs()]),
             change if change < 0.6 => wish.change(random.one(&[
@@ -155,7 +164,8 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
 fn numbers_and_words_survive_a_shell() {
     let view = view_options(&["it's a scene.gltf".into()]);
     let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
-    wish.look([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0], 33.3);
+    let (position, look_at) = ([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0]);
+    wish.look(View { camera: None, position, look_at, shown: Extent::Fov(33.3) });
     let line = quoted(&words(&view.scene, view.quality, view.finish(), &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");
     let shell = std::process::Command::new("sh").arg("-c").arg(format!("printf '%s\\n' {line}")).output();

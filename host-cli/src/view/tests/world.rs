@@ -66,15 +66,8 @@ fn scene() -> Scene {
     };
     let mut lamp = Material::lambertian("lamp", Vec3::splat(0.5));
     lamp.emission = Vec3::ONE;
-    let camera = Camera {
-        name: "eye".into(),
-        origin: Vec3::new(0.0, 0.5, 3.0),
-        right: Vec3::X,
-        up: Vec3::Y,
-        forward: Vec3::NEG_Z,
-        vertical_fov: 0.8,
-        aspect: None,
-    };
+    let camera =
+        Camera::perspective("eye", Vec3::new(0.0, 0.5, 3.0), [Vec3::X, Vec3::Y, Vec3::NEG_Z], 0.8, None);
     Scene::from(SceneContents {
         triangles: vec![triangle(0.0, 0), triangle(1.0, 1)],
         materials: vec![Material::lambertian("floor", Vec3::splat(0.5)), lamp],

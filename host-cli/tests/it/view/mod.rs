@@ -207,6 +207,48 @@ fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
     assert!((page.mean([20, 12]) - lit).abs() < 1e-6);
 }
 
+/// A page states the projection; the settled picture is that of the command that the view shows.
+#[test]
+fn a_page_sees_by_every_projection() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    // The rows of pixels show the middle of the floor.
+    for (shown, option, row) in [
+        (json!({"height": 1.5}), "--orthographic 1.5", 8),
+        (json!({"angles": [180, 90]}), "--panorama 180,90", 6),
+        (json!({"fov": 50}), "--fov 50", 7),
+    ] {
+        let mut message = camera(0.25, false);
+        let fields = message.as_object_mut().unwrap();
+        fields.remove("fov");
+        fields.extend(shown.as_object().unwrap().clone());
+        page.send(&message);
+        let state = page.settle();
+        assert!(state["command"].as_str().unwrap().contains(option), "{}", state["command"]);
+        let (key, value) = shown.as_object().unwrap().iter().next().unwrap();
+        let numbers = |value: &Value| -> Vec<f64> {
+            value
+                .as_array()
+                .map_or(vec![value.clone()], Clone::clone)
+                .iter()
+                .filter_map(Value::as_f64)
+                .collect()
+        };
+        let [known, stated] = [numbers(&state["camera"][key]), numbers(value)];
+        assert!(known.iter().zip(&stated).all(|(known, stated)| (known - stated).abs() < 1e-3), "{known:?}");
+        assert_eq!(known.len(), stated.len());
+        page.send(&json!({"type": "pick", "at": [9, row]}));
+        let picked = page.wait_for("picked");
+        let height = picked["point"][1].as_f64().unwrap_or_else(|| panic!("{option}: {picked}"));
+        assert!(height.abs() < 0.25, "{option}: {picked} is not near the floor");
+    }
+    page.send(&json!({"type": "camera", "position": [0, 0, 3], "look_at": [0, 0, 0], "angles": [400, 90], "moving": false}));
+    let error = page.wait_for("error");
+    assert!(error["text"].as_str().unwrap().contains("360"), "{error}");
+}
+
 #[test]
 fn an_edit_that_removes_all_light_is_refused() {
     let room = Room::new();

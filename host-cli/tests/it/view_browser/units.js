@@ -34,6 +34,21 @@
         const flown = camera.flown(view, [0, 0, 3]);
         check(near(flown.position, camera.add(view.position, camera.scaled(forward, 3))), "a flight is along the view");
 
+        // By parallel rays and in a panorama too, what is pointed at stays.
+        const parallel = { position: view.position, look_at: view.look_at, height: 1 + 4 * random() };
+        const around = { position: view.position, look_at: view.look_at, angles: [360, 180] };
+        for (const other of [parallel, around]) {
+            const there = camera.projected(other, centre, size);
+            check(near(camera.projected(camera.dollied(other, centre, 0.5), centre, size), there, 1e-6), "a dolly keeps its centre");
+            const turned = camera.turned(other, centre, 2 * random() - 1, 0.2 * random() - 0.1);
+            check(near(camera.projected(turned, centre, size), there, 1e-6) || other === around, "an orbit keeps its centre");
+        }
+        const along = camera.panned(parallel, [7, -4], size[1], 1);
+        check(near(camera.projected(along, centre, size), camera.add(camera.projected(parallel, centre, size), [7, -4]), 1e-6),
+            "a pan of parallel rays follows the pointer");
+        check(near(camera.zoomed(parallel, 2).height, 2 * parallel.height) && camera.zoomed(around, 2) === around, "zooms");
+        check(camera.pose(around).endsWith("--panorama 360,180"), "options of a panorama");
+
         const value = Math.fround(10 ** (20 * random() - 10));
         const text = camera.shortest(value);
         check(Math.fround(text) === value, `${value} is printed as ${text}`);

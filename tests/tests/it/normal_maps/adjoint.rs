@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
 use photoncard_driver::render::RenderSettings;
-use photoncard_driver::scene::{Camera, Material, Reflection, Scene, Transmission};
+use photoncard_driver::scene::{Camera, Material, Projection, Reflection, Scene, Transmission};
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::Context;
 use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
@@ -141,8 +141,10 @@ fn pane() -> Material {
 fn photons_light_a_floor_of_two_parts_once() {
     let normals = [tilted(50.0, 180.0), tilted(50.0, 0.0), tilted(20.0, 90.0)];
     let look = |has_pane: bool| {
-        let view =
-            Camera { vertical_fov: 0.2, ..camera(Vec3::new(-0.9, 0.0, 0.4), Vec3::new(0.9, 0.0, -0.4)) };
+        let view = Camera {
+            projection: Projection::perspective(0.2),
+            ..camera(Vec3::new(-0.9, 0.0, 0.4), Vec3::new(0.9, 0.0, -0.4))
+        };
         let mut lit = plate(mapped(plastic(0.3), 1.0), &normals, Vec4::new(1.0, 0.0, 0.0, 1.0), view);
         lit.materials.push(pane());
         lit.lights = vec![directional(DVec3::Z, 1.0)];

@@ -9,8 +9,8 @@ use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::film::{Film, Window};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind, PunctualLight,
-    Reflection, Scene, Sheen, Texture,
+    Camera, Encoding, Environment, Image, Layers, Material, NormalMap, Projection, PunctualKind,
+    PunctualLight, Reflection, Scene, Sheen, Texture,
 };
 use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, scene};
@@ -94,7 +94,10 @@ fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 50.0;
     // Seen from straight above, +y is upwards in the picture.
     let aside = if direction.x == 0.0 && direction.y == 0.0 { Vec3::new(0.0, 1e-4, 0.0) } else { Vec3::ZERO };
-    Camera { vertical_fov: 2.0 * (0.9_f32 / 50.0).atan(), ..camera(origin, aside - origin) }
+    Camera {
+        projection: Projection::perspective(2.0 * (0.9_f32 / 50.0).atan()),
+        ..camera(origin, aside - origin)
+    }
 }
 
 fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
@@ -420,7 +423,7 @@ fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
         for scale in [0.0, 0.5] {
             let view = camera(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z);
             let mut scene = scene(Vec::new(), vec![mapped(metal(roughness), scale)], view);
-            scene.cameras[0].vertical_fov = 2.0 * 0.24_f32.atan();
+            scene.cameras[0].projection = Projection::perspective(2.0 * 0.24_f32.atan());
             add_ball(&mut scene, Vec3::ZERO, 1.2, 8, 0);
             add_tangents(&mut scene, 0, Vec4::new(0.0, 1.0, 0.0, 1.0));
             for (index, attributes) in scene.attributes.iter_mut().enumerate() {
