@@ -6,6 +6,7 @@ mod boards;
 mod caches;
 mod card;
 mod caustics;
+mod coverage;
 mod density;
 mod emission;
 mod energy;

@@ -80,6 +80,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             fov: Pixels = Some(20.0),
             layers: Pixels = Layers::all(),
             filter: Pixels = Filter::Gaussian,
+            transparent: Pixels = true,
         }
         photons: PhotonMaps {
             count: Image = 2001,
@@ -142,9 +143,10 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
     changes
 }
 
-/// Scene with every feature, seen by two cameras.
+/// Scene with every feature, and half of the wall before the camera open to the sky, seen by two cameras.
 fn with_two_cameras() -> Scene {
     let mut scene = everything();
+    scene.triangles.remove(8);
     let mut second = scene.cameras[0].clone();
     second.name = "second".into();
     second.vertical_fov *= 0.9;
@@ -159,8 +161,15 @@ fn bits(film: &Film) -> Vec<u32> {
     let pixels = film.all().flat_map(|film| {
         let pixel = [film.pixel.radiance, film.pixel.albedo, film.pixel.normal];
         let layers = [film.layers.direct, film.layers.indirect, film.layers.caustic];
-        let single = [film.pixel.depth, film.layers.gathers];
-        pixel.into_iter().chain(layers).flatten().chain(single).map(f32::to_bits).collect::<Vec<_>>()
+        let single = [film.pixel.depth, film.layers.gathers, film.alpha];
+        pixel
+            .into_iter()
+            .chain(layers)
+            .chain([film.position])
+            .flatten()
+            .chain(single)
+            .map(f32::to_bits)
+            .collect::<Vec<_>>()
     });
     size.into_iter().chain(pixels).collect()
 }
