@@ -104,6 +104,7 @@ def frame_of(head, side):
         b"\0" + number(0),  # no layers, box filter
         number(1) + b"\0",  # one tile in flight, no kept records
         option(threshold and floats(threshold)),
+        b"\0" * 4,  # a background, and no sums of position, coverage and identities
     ]
     return b"".join(parts)
 

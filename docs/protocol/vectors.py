@@ -34,7 +34,8 @@ FRAME = (
     ("neighbors", "u32"), ("max_distance", "f32"), ("sampling", 4), ("irradiance_error", ["f32"]),
     ("bins", "u32"), ("drain", 4), ("queue", "u32"), ("radiance", 2), ("caustics", [CAUSTICS]),
     ("layers", "flag"), ("filter", 3), ("in_flight", "u32"), ("keep_records", "flag"),
-    ("adaptive_threshold", ["f32"]),
+    ("adaptive_threshold", ["f32"]), ("transparent", "flag"), ("position", "flag"), ("coverage", "flag"),
+    ("identities", "flag"),
 )
 BUDGET = tuple(
     (name, "u64" if name == "dram_bytes" else "u32")

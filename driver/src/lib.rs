@@ -31,7 +31,7 @@
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("cornell.exr");
 //! let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels)?;
-//! let content = Content { film: &rendering.film, layers: &settings.picture.layers, denoised: None };
+//! let content = Content::new(&rendering.film, &settings.picture.layers);
 //! exr::write(&path, &content, &provenance, SampleFormat::Float)?;
 //! let picture = exr::read(&path, exr::Shown::Rendered)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));
@@ -139,7 +139,7 @@ pub use photoncard_cards::{dispatcher, link, scheduler, session};
 pub use photoncard_denoise as denoise;
 pub use photoncard_map::{bvh, pack, photon, photon_map};
 pub use photoncard_picture::{
-    choice, difference, exr, film, layer, output, printable, sink, sums, tone_mapping, viewer,
+    choice, cryptomatte, difference, exr, film, layer, output, printable, sink, sums, tone_mapping, viewer,
 };
 pub use photoncard_render::{self as render, cost_model, display, emulator, partial, parts, quality};
 pub use photoncard_scene::{self as scene, error};

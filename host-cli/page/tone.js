@@ -9,7 +9,7 @@ export const MODES = { light: 0, share: 1, direction: 2, amount: 3 };
 
 export const modeOf = layer =>
     ["radiance", "direct", "indirect", "caustic"].includes(layer) ? MODES.light
-        : layer === "albedo" ? MODES.share
+        : ["albedo", "alpha"].includes(layer) ? MODES.share
             : layer === "N" ? MODES.direction : MODES.amount;
 
 export const CURVES = ["none", "reinhard", "aces"];

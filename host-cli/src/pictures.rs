@@ -1,6 +1,7 @@
 //! Commands `photoncard merge`, `photoncard tonemap` and `photoncard diff`, whose inputs are pictures.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use photoncard_driver::difference::compare;
 use photoncard_driver::exr::{Shown, read};
@@ -41,9 +42,11 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
         serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
     let form = Form {
         layers: merged.layers,
+        is_transparent: merged.is_transparent,
+        identities: merged.identities.map(Arc::new),
         sample_type: *sample_type,
         tone: tone.mapping(),
-        denoised: denoised(denoiser, &merged.film, None)?,
+        denoised: denoised(denoiser, &merged.film, merged.is_transparent, None)?,
         part: None,
     };
     for picture in pictures {
@@ -87,7 +90,8 @@ pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
     let picture = read(input, Shown::Denoised).map_err(|error| Failure::input_error(&error))?;
     let radiance = picture.pixels.iter().copied();
     let provenance = picture.provenance.as_deref();
-    let written = write_png(output, picture.size(), radiance, tone.mapping(), provenance);
+    let alpha = picture.alpha.as_deref();
+    let written = write_png(output, picture.size(), radiance, alpha, tone.mapping(), provenance);
     written.map_err(|error| match error {
         PngError::NotANumber { .. } => Failure::input_error(&error),
         _ => Failure::work_error(&error),

@@ -26,6 +26,8 @@ pub const HEADER_LINES: usize = 2;
 pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 /// Number of cumulative probabilities of [`SectionKind::EnvironmentCells`] per line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
+/// Number of identities of [`SectionKind::Identities`] per line.
+pub const IDENTITIES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
 /// Sections of a card image, in the order of their lines and of their entries in the section table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,10 +82,14 @@ pub enum SectionKind {
     IrradianceNodes = 17,
     /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in place of photons.
     IrradianceLeaves = 18,
+    /// Identities of the triangles, `u32` values: [`LEAF_TRIANGLES`](crate::layout::LEAF_TRIANGLES) for each [`crate::layout::BvhLeaf`], one
+    /// for each triangle by slot. Those of triangles in a group are relative to the first value of the
+    /// [`crate::layout::Instance`]. Empty unless a frame asks for identities.
+    Identities = 19,
 }
 
 /// Number of sections.
-pub const SECTIONS: usize = 19;
+pub const SECTIONS: usize = 20;
 
 impl SectionKind {
     /// All sections, in order.
@@ -107,6 +113,7 @@ impl SectionKind {
         Self::CausticLeaves,
         Self::IrradianceNodes,
         Self::IrradianceLeaves,
+        Self::Identities,
     ];
 
     /// Number of records per line.
@@ -120,6 +127,7 @@ impl SectionKind {
             Self::Emitters => Emitter::PER_LINE as u32,
             Self::DistantLights => DistantLight::PER_LINE as u32,
             Self::EnvironmentCells => THRESHOLDS_PER_LINE,
+            Self::Identities => IDENTITIES_PER_LINE,
             Self::Photons => Photon::PER_LINE as u32,
             Self::Nodes
             | Self::Triangles
@@ -140,7 +148,7 @@ impl SectionKind {
         match self {
             Self::Nodes => Structure::Nodes,
             Self::Triangles => Structure::Triangles,
-            Self::LeafAttributes | Self::Attributes => Structure::Attributes,
+            Self::LeafAttributes | Self::Attributes | Self::Identities => Structure::Attributes,
             Self::Materials | Self::Layers => Structure::Materials,
             Self::Textures | Self::Texels => Structure::Textures,
             Self::Emitters | Self::LightNodes | Self::DistantLights | Self::EnvironmentCells => {

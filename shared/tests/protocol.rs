@@ -314,6 +314,10 @@ fn structures_have_their_golden_bytes() {
         in_flight: 9,
         keep_records: true,
         adaptive_threshold: Some(1.0),
+        transparent: true,
+        position: false,
+        coverage: true,
+        identities: false,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero, one, zero].concat();
@@ -331,6 +335,7 @@ fn structures_have_their_golden_bytes() {
         &one,
         &[1, 2, 9, 1, 1],
         &one,
+        &[1, 0, 1, 0],
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
@@ -445,15 +450,30 @@ fn sums_of_a_pixel_survive_their_record() {
     };
     let layers =
         LayerSums { direct: [1, 2, 3], indirect: [4, 5, 6], caustic: [7, 8, i64::MAX], gathers: 4096 };
-    for (has_layers, sums) in [(false, view.with_light([9, 10, 11])), (true, view.with_layers(layers))] {
+    let mut identities = IdentityCoverage::NONE;
+    (0..20).for_each(|identity| identities.add(identity, 100 + identity));
+    let full = PixelSums {
+        position: Some([-1, 2, i64::MIN]),
+        coverage: Some(u32::MAX),
+        identities: Some(identities),
+        ..view.with_layers(layers)
+    };
+    let forms = [false, true].map(|layers| {
+        let form = |position, coverage, identities| PixelForm { layers, position, coverage, identities };
+        let flags = [false, true];
+        flags.map(|p| flags.map(|c| flags.map(|i| full.in_form(form(p, c, i)))))
+    });
+    let lit = [view.with_light([9, 10, 11]), view.with_layers(layers)];
+    for sums in forms.as_flattened().as_flattened().as_flattened().iter().copied().chain(lit) {
         let mut bytes = Vec::new();
         sums.write(&mut |part| bytes.extend_from_slice(part));
-        assert_eq!(bytes.len(), record_bytes(has_layers));
+        assert_eq!(bytes.len(), sums.form().record_bytes());
+        assert_eq!(PixelForm::of_length(bytes.len()), Some(sums.form()));
         assert_eq!(PixelSums::read(&bytes), Some(sums));
         assert_eq!(bytes[8..12], [0xff; 4]);
         assert_eq!(bytes[24..36], [[0xf9, 0xff, 0xff, 0xff], [0xff; 4], [8, 0, 0, 0]].concat());
         assert_eq!(PixelSums::read(&bytes[1..]), None);
-        assert!(PIXELS_BYTES >= 8 * bytes.len());
+        assert!(PIXELS_BYTES >= 4 * bytes.len());
     }
     assert_eq!(view.with_layers(layers).light, [12, 15, i64::MAX]);
 }

@@ -73,6 +73,11 @@ pub fn everything() -> Scene {
         let along = Vec3::new(1.0, 0.0, 0.3).normalize();
         add_tangents(&mut scene, material, along.extend(x.signum()));
     }
+    // Neighbouring triangles are of different objects.
+    scene.objects = (0..5).map(|object| format!("object {object}")).collect();
+    for (index, triangle) in (0..).zip(&mut scene.triangles) {
+        triangle.object = index % 5;
+    }
     scene
 }
 

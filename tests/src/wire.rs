@@ -6,8 +6,8 @@ use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::{
-    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryTest, MemoryUse, PROTOCOL_VERSION, Reply,
-    record_bytes,
+    self, Command, Fault, FaultCode, LINES_PER_WRITE, MemoryTest, MemoryUse, PROTOCOL_VERSION, PixelForm,
+    Reply,
 };
 use photoncard_shared::transport::Transport;
 
@@ -17,8 +17,8 @@ pub struct Wire<'a, K: FixedKind = Micro> {
     pub card: Box<Card<K, Dram<'a>>>,
     host: Transport,
     session: u32,
-    /// True if the last frame begun has layers, which make the records of pixels longer.
-    layers: bool,
+    /// Optional contents of the pixels of the last frame begun.
+    form: PixelForm,
 }
 
 /// Content of a [`Reply`] that tests read, without its borrowed bytes.
@@ -55,7 +55,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
     /// Creates a card of kind `K`, as after power-on, whose DRAM is `memory`.
     pub fn of_kind(memory: &'a mut [Line]) -> Self {
         let card = Box::new(Card::new(Dram::new(memory)));
-        Self { card, host: Transport::host(), session: 0, layers: false }
+        Self { card, host: Transport::host(), session: 0, form: PixelForm::PLAIN }
     }
 
     /// Sends a command and runs the card until it is idle. Returns its answers.
@@ -73,7 +73,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
     pub fn say_all(&mut self, commands: &[Command]) -> Vec<Answer> {
         for command in commands {
             if let Command::BeginFrame(frame) = command {
-                self.layers = frame.layers;
+                self.form = frame.form();
             }
             assert!(self.host.send(|bytes| message::encode(command, bytes)), "there is room for a command");
         }
@@ -110,7 +110,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
                 rest = &rest[self.host.receive(rest).0..];
                 while let Some(payload) = self.host.take() {
                     let reply = message::decode(payload).expect("a card sends replies");
-                    answers.push(answer(reply, self.layers));
+                    answers.push(answer(reply, self.form));
                 }
             }
             if to_card.is_empty() && to_host.is_empty() && !self.card.is_busy() {
@@ -153,13 +153,13 @@ impl<'a, K: FixedKind> Wire<'a, K> {
     }
 }
 
-fn answer(reply: Reply, layers: bool) -> Answer {
+fn answer(reply: Reply, form: PixelForm) -> Answer {
     match reply {
         Reply::Hello { written_lines, memory_use, .. } => Answer::Hello(written_lines, memory_use),
         Reply::Checksums { data, .. } => Answer::Checksums(data.to_vec()),
         Reply::ImageAccepted => Answer::ImageAccepted,
         Reply::FrameAccepted => Answer::FrameAccepted,
-        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / record_bytes(layers)),
+        Reply::Pixels { data, .. } => Answer::Pixels(data.len() / form.record_bytes()),
         Reply::TileDone { tile, .. } => Answer::TileDone(tile),
         Reply::Fault(Fault { code, .. }) => Answer::Fault(code),
         Reply::Computed { results } => Answer::Computed(results.len()),

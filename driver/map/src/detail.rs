@@ -185,7 +185,7 @@ mod tests {
                     coordinates: [across; 2],
                     ..VertexAttributes::NONE
                 });
-                scene.triangles.push(Triangle { vertices, material: 0, attributes });
+                scene.triangles.push(Triangle { vertices, material: 0, attributes, object: 0 });
             }
             let corners = [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1];
             scene.triangles.push(Triangle::new(corners.map(|corner| corner + Vec3::Y * height), 0));

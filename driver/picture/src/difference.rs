@@ -283,7 +283,7 @@ mod tests {
     fn picture(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 3]) -> RgbImage {
         let pixels =
             (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
-        RgbImage { width, height, data_window_origin: [0, 0], pixels, provenance: None }
+        RgbImage { width, height, data_window_origin: [0, 0], pixels, alpha: None, provenance: None }
     }
 
     fn near(a: f64, b: f64) -> bool {

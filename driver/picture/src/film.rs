@@ -17,14 +17,16 @@
 use std::sync::{Mutex, PoisonError};
 
 use photoncard_shared::message::Tile;
-pub use photoncard_shared::message::{LayerSums, Pixel as PixelValue, PixelLayers, PixelSums, SumScale};
+pub use photoncard_shared::message::{
+    LayerSums, Pixel as PixelValue, PixelForm, PixelLayers, PixelSums, SumScale,
+};
 use thiserror::Error;
 
 use crate::allocation;
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
 pub use crate::sums::{FilmPixel, SumFormat};
 
-/// Maximum number of pixels of a film, 2^28. They take 15 GiB, or 28 GiB with layers.
+/// Maximum number of pixels of a film, 2^28. They take 15 GiB, or up to 59 GiB with optional contents.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.
@@ -133,6 +135,8 @@ pub struct Film {
     height: u32,
     window: Window,
     format: SumFormat,
+    /// Position of the scene's origin in the coordinates of its file, metres.
+    origin: [f64; 3],
     /// Encoded sums of the pixels, row by row.
     records: Vec<u8>,
     written: Vec<bool>,
@@ -151,7 +155,8 @@ impl Film {
         let records = allocation::zeros(bytes).map_err(|_| too_large)?;
         allocation::check(count as u64).map_err(|_| too_large)?;
         let written = vec![false; count];
-        Ok(Self { width, height, window, format, records, written, missing: count })
+        let origin = [0.0; 3];
+        Ok(Self { width, height, window, format, origin, records, written, missing: count })
     }
 
     /// Checks that a film can be created, before its memory is allocated. Returns its number of pixels.
@@ -171,6 +176,17 @@ impl Film {
     /// Format of the sums.
     pub fn format(&self) -> &SumFormat {
         &self.format
+    }
+
+    /// Position of the scene's origin in the coordinates of its file, metres; 0 unless it was set.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
+    }
+
+    /// Sets the position of the scene's origin in the coordinates of its file, metres. Positions of pixels are
+    /// in these coordinates.
+    pub fn set_origin(&mut self, origin: [f64; 3]) {
+        self.origin = origin;
     }
 
     /// Restricts an empty film to the samples that `base` lacks, so that only these are rendered.
@@ -198,7 +214,8 @@ impl Film {
     /// # Errors
     /// [`FilmError::Memory`].
     pub fn empty_with(&self, first: u32, samples: u32) -> Result<Self, FilmError> {
-        Self::new(self.width, self.height, self.window, self.format.of_part(first, samples))
+        let film = Self::new(self.width, self.height, self.window, self.format.of_part(first, samples))?;
+        Ok(Self { origin: self.origin, ..film })
     }
 
     /// Excludes samples before number `first` from an empty film.
@@ -234,7 +251,7 @@ impl Film {
 
     /// Values of the pixels in the crop window including layers, row by row from the top.
     pub fn all(&self) -> impl ExactSizeIterator<Item = FilmPixel> + Clone {
-        self.sums().map(|sums| self.format.values(&sums))
+        self.sums().map(|sums| self.format.values(&sums, self.origin))
     }
 
     /// Values of the pixel at `(x, y)` of the full picture; `None` outside the crop window.
@@ -244,7 +261,7 @@ impl Film {
 
     /// Values of the pixel at `(x, y)` of the full picture including layers; `None` outside the crop window.
     pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
-        self.sums_at(x, y).map(|sums| self.format.values(&sums))
+        self.sums_at(x, y).map(|sums| self.format.values(&sums, self.origin))
     }
 
     /// Sums of the pixel at `(x, y)` of the full picture; `None` outside the crop window.
@@ -254,17 +271,14 @@ impl Film {
         PixelSums::read(&self.records[index * bytes..(index + 1) * bytes])
     }
 
-    /// Writes the sums of the pixel at `(x, y)` of the full picture, replacing earlier ones. Layers that the
-    /// film lacks are dropped; layers that the sums lack become zero.
+    /// Writes the sums of the pixel at `(x, y)` of the full picture, replacing earlier ones. Optional
+    /// contents that the film lacks are dropped; those that the sums lack become zero.
     ///
     /// # Errors
     /// [`FilmError::Outside`] if the pixel is not in the crop window. The film does not change then.
     pub fn write(&mut self, x: u32, y: u32, sums: &PixelSums) -> Result<(), FilmError> {
         let index = self.index(x, y).ok_or(FilmError::Outside { x, y, window: self.window })?;
-        let sums = match (self.format.layers, sums.layers) {
-            (true, layers) => sums.with_layers(layers.unwrap_or_default()),
-            (false, _) => sums.with_light(sums.light),
-        };
+        let sums = sums.in_form(self.format.form);
         let bytes = self.format.record_bytes();
         store(&sums, &mut self.records[index * bytes..(index + 1) * bytes]);
         if !std::mem::replace(&mut self.written[index], true) {
@@ -452,7 +466,8 @@ mod tests {
         assert_eq!(all.pixel(0, 0).unwrap().radiance, [2.0; 3]);
         assert_eq!(all.finished(&tile(2)).as_ref(), Some(&added));
         assert_eq!(all.finished(&tile(3)), None);
-        let mut other = Film::new(3, 1, window, SumFormat { layers: true, ..SumFormat::ONE }).unwrap();
+        let mut other =
+            Film::new(3, 1, window, SumFormat { form: PixelForm::LAYERED, ..SumFormat::ONE }).unwrap();
         assert_eq!(other.add(&all), Err(FilmError::Other));
     }
 }

@@ -4,6 +4,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use photoncard_shared::message::PixelForm;
+
 use crate::sums::FilmPixel;
 
 /// One channel of a picture.
@@ -47,6 +49,14 @@ const NORMAL: [Channel; 3] = [
     Channel { name: "N.Z", value: |film| film.pixel.normal[2] },
 ];
 const DEPTH: [Channel; 1] = [Channel { name: "Z", value: |film| film.pixel.depth }];
+const ALPHA: [Channel; 1] = [Channel { name: "alpha.Y", value: |film| film.alpha }];
+const POSITION: [Channel; 3] = [
+    Channel { name: "P.X", value: |film| film.position[0] },
+    Channel { name: "P.Y", value: |film| film.position[1] },
+    Channel { name: "P.Z", value: |film| film.position[2] },
+];
+/// Channel of alpha in the unnamed layer of a transparent picture.
+pub(crate) const COLOUR_ALPHA: Channel = Channel { name: "A", value: |film| film.alpha };
 const GATHERS: [Channel; 1] = [Channel { name: "gathers.Y", value: |film| film.layers.gathers }];
 
 /// A layer of a picture besides radiance.
@@ -67,12 +77,32 @@ pub enum Layer {
     Depth,
     /// Number of the pixel's samples with a final gather instead of interpolated irradiance.
     Gathers,
+    /// Fraction of the pixel that surfaces cover, 0 to 1. Glass in front of the environment covers it.
+    Alpha,
+    /// Mean position, in the coordinates of the scene's file, metres, of the first surfaces that the eye rays
+    /// hit; 0 if no surface is visible.
+    Position,
+    /// Coverage by object, by the names of nodes, as [Cryptomatte](crate::cryptomatte).
+    Object,
+    /// Coverage by material, by the materials' names, as [Cryptomatte](crate::cryptomatte).
+    Material,
 }
 
 impl Layer {
     /// All layers.
-    pub const ALL: [Self; 7] =
-        [Self::Direct, Self::Indirect, Self::Caustic, Self::Albedo, Self::Normal, Self::Depth, Self::Gathers];
+    pub const ALL: [Self; 11] = [
+        Self::Direct,
+        Self::Indirect,
+        Self::Caustic,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Gathers,
+        Self::Alpha,
+        Self::Position,
+        Self::Object,
+        Self::Material,
+    ];
 
     /// Name of the layer in channel names and lists of layers.
     pub fn name(self) -> &'static str {
@@ -84,10 +114,15 @@ impl Layer {
             Self::Normal => "N",
             Self::Depth => "Z",
             Self::Gathers => "gathers",
+            Self::Alpha => "alpha",
+            Self::Position => "position",
+            Self::Object => "object",
+            Self::Material => "material",
         }
     }
 
-    /// Channels of the layer.
+    /// Channels of the layer; none for the mattes, whose channels are not values of a [`FilmPixel`]
+    /// ([`crate::cryptomatte::Matte`]).
     pub fn channels(self) -> &'static [Channel] {
         match self {
             Self::Direct => &DIRECT,
@@ -97,19 +132,33 @@ impl Layer {
             Self::Normal => &NORMAL,
             Self::Depth => &DEPTH,
             Self::Gathers => &GATHERS,
+            Self::Alpha => &ALPHA,
+            Self::Position => &POSITION,
+            Self::Object | Self::Material => &[],
         }
     }
 
-    /// Returns whether chips send the layer only in frames that ask for it
-    /// ([`photoncard_shared::message::FrameParameters::layers`]).
-    fn is_of_chip(self) -> bool {
-        matches!(self, Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers)
+    /// Returns whether chips send what the layer needs only on request.
+    pub fn is_of_chip(self) -> bool {
+        self.form() != PixelForm::PLAIN
+    }
+
+    /// Optional contents of pixels that the layer needs.
+    fn form(self) -> PixelForm {
+        let plain = PixelForm::PLAIN;
+        match self {
+            Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers => PixelForm::LAYERED,
+            Self::Albedo | Self::Normal | Self::Depth => plain,
+            Self::Alpha => PixelForm { coverage: true, ..plain },
+            Self::Position => PixelForm { position: true, ..plain },
+            Self::Object | Self::Material => PixelForm { coverage: true, identities: true, ..plain },
+        }
     }
 
     /// Returns whether the layer is always stored in single precision, because distances and counts exceed
     /// the precision of halves.
     pub(crate) fn is_always_single(self) -> bool {
-        matches!(self, Self::Depth | Self::Gathers)
+        matches!(self, Self::Depth | Self::Gathers | Self::Position)
     }
 }
 
@@ -138,18 +187,43 @@ impl Layers {
         self.0.iter().copied()
     }
 
-    /// Returns whether any of the layers is one that chips send only on request
-    /// ([`photoncard_shared::message::FrameParameters::layers`]): direct light, indirect light, caustics or
-    /// final gathers.
-    pub fn are_of_chip(&self) -> bool {
-        self.iter().any(Layer::is_of_chip)
+    /// The layers, and those of `more`.
+    #[must_use]
+    pub fn and(&self, more: &Self) -> Self {
+        let either = |layer: &Layer| self.0.contains(layer) || more.0.contains(layer);
+        Self(Layer::ALL.into_iter().filter(either).collect())
     }
 
-    /// Returns all four layers that chips send only on request if `self` contains any of them, otherwise
-    /// none.
+    /// All layers but the mattes.
+    pub fn without_mattes() -> Self {
+        Self(Layer::ALL.into_iter().filter(|layer| !layer.form().identities).collect())
+    }
+
+    /// Optional contents of pixels that the layers need: those that chips send only on request.
+    pub fn form(&self) -> PixelForm {
+        self.iter().map(Layer::form).fold(PixelForm::PLAIN, PixelForm::union)
+    }
+
+    /// Returns whether the layers separate the light: whether any of them is direct light, indirect light,
+    /// caustics or final gathers ([`photoncard_shared::message::FrameParameters::layers`]).
+    pub fn separate_light(&self) -> bool {
+        self.form().layers
+    }
+
+    /// Returns all layers for which chips send the optional contents that `self` needs, except those that
+    /// chips always send. Pictures whose layers have the same result have the same sums.
     pub fn of_chip(&self) -> Self {
-        let are_of_chip = self.are_of_chip();
-        Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())
+        let form = self.form();
+        let is_sent = |layer: &Layer| {
+            let needed = layer.form();
+            layer.is_of_chip() && needed.union(form) == form
+        };
+        Self(Layer::ALL.into_iter().filter(is_sent).collect())
+    }
+
+    /// Returns whether any layer is a matte, for which the card image must have identities.
+    pub fn have_mattes(&self) -> bool {
+        self.form().identities
     }
 
     /// Channels `R G B` of radiance.
@@ -201,7 +275,7 @@ mod tests {
     fn lists_of_layers_are_read_as_they_are_written() {
         for (text, full) in [
             ("none", "none"),
-            ("all", "direct,indirect,caustic,albedo,N,Z,gathers"),
+            ("all", "direct,indirect,caustic,albedo,N,Z,gathers,alpha,position,object,material"),
             ("Z,direct,Z", "direct,Z"),
             ("gathers", "gathers"),
         ] {
@@ -220,13 +294,22 @@ mod tests {
 
     #[test]
     fn chips_render_only_some_layers() {
-        for (text, are_of_chip) in
-            [("none", false), ("albedo,N,Z", false), ("caustic", true), ("Z,gathers", true)]
-        {
+        let light = "direct,indirect,caustic,gathers";
+        for (text, rendered) in [
+            ("none", "none"),
+            ("albedo,N,Z", "none"),
+            ("caustic", light),
+            ("Z,gathers", light),
+            ("alpha", "alpha"),
+            ("position,N", "position"),
+            ("object", "alpha,object,material"),
+            ("material,direct", "direct,indirect,caustic,gathers,alpha,object,material"),
+        ] {
             let layers: Layers = text.parse().unwrap();
-            assert_eq!(layers.are_of_chip(), are_of_chip, "{text}");
-            let rendered = if are_of_chip { "direct,indirect,caustic,gathers" } else { "none" };
+            assert_eq!(layers.separate_light(), rendered.contains("direct"), "{text}");
+            assert_eq!(layers.have_mattes(), rendered.contains("material"), "{text}");
             assert_eq!(layers.of_chip().to_string(), rendered, "{text}");
+            assert_eq!(layers.of_chip().form(), layers.form(), "{text}");
         }
     }
 }

@@ -61,9 +61,9 @@ impl FinishedTile {
         self.sums().any(|(_, sums)| self.format.is_dazzling(&sums))
     }
 
-    /// Column, row and values of each pixel.
+    /// Column, row and values of each pixel. Positions are relative to the scene's origin.
     pub fn pixels(&self) -> impl Iterator<Item = ((u32, u32), FilmPixel)> {
-        self.sums().map(|(place, sums)| (place, self.format.values(&sums)))
+        self.sums().map(|(place, sums)| (place, self.format.values(&sums, [0.0; 3])))
     }
 }
 

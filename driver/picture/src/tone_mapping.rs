@@ -5,6 +5,9 @@
 //! reproduction for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses the scaled radiance,
 //! which is clipped to 1 and encoded with the sRGB transfer function. Negative radiance is shown black,
 //! infinite radiance white.
+//!
+//! A picture with alpha has premultiplied radiance. Exposure and curve are applied to the radiance divided by
+//! alpha, as in Blender, and the file has these colours and alpha: a PNG is not premultiplied.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -125,6 +128,8 @@ pub enum PngError {
 
 /// Writes a picture of `width` x `height` pixels of linear radiance to `path` as PNG, whole or not at all.
 ///
+/// With `alpha`, the alpha of each pixel, the radiance is premultiplied and the PNG has an alpha channel.
+///
 /// The JSON of the picture's provenance is stored in the text chunk [`PROVENANCE`], with characters beyond
 /// ASCII as `\u` escapes. The JSON of the mapping is stored in the text chunk [`TONE_MAPPING`].
 ///
@@ -136,10 +141,11 @@ pub fn write_png(
     path: &Path,
     [width, height]: [u32; 2],
     radiance: impl Iterator<Item = [f32; 3]> + Clone,
+    alpha: Option<&[f32]>,
     mapping: ToneMapping,
     provenance_json: Option<&str>,
 ) -> Result<(), PngError> {
-    let bytes = png_bytes(path, [width, height], radiance, mapping, provenance_json)?;
+    let bytes = png_bytes(path, [width, height], radiance, alpha, mapping, provenance_json)?;
     Ok(output::write(path, &bytes)?)
 }
 
@@ -151,6 +157,28 @@ pub fn png_bytes(
     path: &Path,
     [width, height]: [u32; 2],
     radiance: impl Iterator<Item = [f32; 3]> + Clone,
+    alpha: Option<&[f32]>,
+    mapping: ToneMapping,
+    provenance_json: Option<&str>,
+) -> Result<Vec<u8>, PngError> {
+    let Some(alpha) = alpha else {
+        return encoded(path, [width, height], radiance, None, mapping, provenance_json);
+    };
+    let straight = radiance.zip(alpha).map(|(pixel, &alpha)| unpremultiplied(pixel, alpha));
+    encoded(path, [width, height], straight, Some(alpha), mapping, provenance_json)
+}
+
+/// Divides premultiplied radiance by alpha; black where nothing is covered.
+fn unpremultiplied(radiance: [f32; 3], alpha: f32) -> [f32; 3] {
+    if alpha > 0.0 { radiance.map(|value| value / alpha) } else { [0.0; 3] }
+}
+
+/// Encodes radiance that is not premultiplied.
+fn encoded(
+    path: &Path,
+    [width, height]: [u32; 2],
+    radiance: impl Iterator<Item = [f32; 3]> + Clone,
+    alpha: Option<&[f32]>,
     mapping: ToneMapping,
     provenance_json: Option<&str>,
 ) -> Result<Vec<u8>, PngError> {
@@ -163,10 +191,19 @@ pub fn png_bytes(
         Some(stops) if stops.is_finite() => libm::exp2f(stops),
         Some(exposure) => return Err(PngError::Exposure { exposure }),
     };
-    let pixels: Vec<u8> = radiance.flat_map(|pixel| tone_map(pixel, scale, mapping.curve)).collect();
+    let colours = radiance.map(|pixel| tone_map(pixel, scale, mapping.curve));
+    let (pixels, colour): (Vec<u8>, _) = match alpha {
+        None => (colours.flatten().collect(), png::ColorType::Rgb),
+        Some(alpha) => {
+            let with_alpha = |([red, green, blue], alpha): ([u8; 3], &f32)| {
+                [red, green, blue, (255.0 * alpha.clamp(0.0, 1.0) + 0.5) as u8]
+            };
+            (colours.zip(alpha).flat_map(with_alpha).collect(), png::ColorType::Rgba)
+        }
+    };
     let mut texts = vec![(TONE_MAPPING, mapping.to_json())];
     texts.extend(provenance_json.map(|json| (PROVENANCE, ascii(json))));
-    let encoded = encode_png([width, height], &pixels, texts);
+    let encoded = encode_png([width, height], &pixels, colour, texts);
     encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })
 }
 
@@ -199,11 +236,12 @@ pub fn is_intact(path: &Path) -> bool {
 fn encode_png(
     [width, height]: [u32; 2],
     pixels: &[u8],
+    colour: png::ColorType,
     texts: Vec<(&str, String)>,
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     for (keyword, text) in texts {
@@ -266,7 +304,8 @@ mod tests {
     fn written(radiance: &[[f32; 3]], exposure: Option<f32>, curve: ToneCurve) -> (u32, u32, Vec<u8>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.png");
-        write_png(&path, [4, 3], radiance.iter().copied(), ToneMapping { exposure, curve }, None).unwrap();
+        write_png(&path, [4, 3], radiance.iter().copied(), None, ToneMapping { exposure, curve }, None)
+            .unwrap();
         decode(&path)
     }
 
@@ -287,7 +326,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.png");
         let picture = grey(|x, y| (x * y) as f32);
-        write_png(&path, [4, 3], picture.iter().copied(), ToneMapping::default(), Some("{}")).unwrap();
+        write_png(&path, [4, 3], picture.iter().copied(), None, ToneMapping::default(), Some("{}")).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         assert!(is_intact(&path));
         let is_kept = |changed: &[u8]| {
@@ -353,6 +392,26 @@ mod tests {
         }
     }
 
+    /// A PNG has the colour of the surface, however much of a pixel the surface covers.
+    #[test]
+    fn a_png_with_alpha_is_not_premultiplied() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let alpha: Vec<f32> = (0..12).map(|index| index as f32 / 11.0).collect();
+        let premultiplied: Vec<[f32; 3]> = alpha.iter().map(|alpha| [0.18 * alpha; 3]).collect();
+        for exposure in [Some(0.0), None] {
+            let mapping = ToneMapping { exposure, curve: ToneCurve::None };
+            write_png(&path, [4, 3], premultiplied.iter().copied(), Some(&alpha), mapping, None).unwrap();
+            let (width, height, pixels) = decode(&path);
+            assert_eq!((width, height, pixels.len()), (4, 3, 48));
+            assert_eq!(pixels[..4], [0; 4]);
+            for (index, pixel) in pixels.chunks(4).enumerate().skip(1) {
+                assert_eq!(pixel[..3], [118; 3], "{index}");
+                assert_eq!(pixel[3], (index as f32 * 255.0 / 11.0).round() as u8);
+            }
+        }
+    }
+
     #[test]
     fn negative_and_infinite_radiance_is_shown() {
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
@@ -369,7 +428,7 @@ mod tests {
         let path = folder.path().join("x.png");
         let refused = |size, picture: &[[f32; 3]], exposure| {
             let mapping = ToneMapping { exposure, curve: ToneCurve::default() };
-            let result = write_png(&path, size, picture.iter().copied(), mapping, None);
+            let result = write_png(&path, size, picture.iter().copied(), None, mapping, None);
             assert!(!path.exists());
             result.unwrap_err()
         };

@@ -4,12 +4,16 @@ use std::fs;
 use std::path::Path;
 
 use exr::prelude::{
-    Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
-    Vec2, WritableImage,
+    AttributeValue, Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers,
+    SpecificChannels, Vec2, WritableImage,
 };
-use photoncard_picture::exr::{Content, ExrError, SampleFormat, Shown, is_intact, read, write};
-use photoncard_picture::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
+use photoncard_picture::cryptomatte::Identities;
+use photoncard_picture::exr::{Content, ExrError, SampleFormat, Shown, bytes, is_intact, read, write};
+use photoncard_picture::film::{
+    Film, FilmPixel, PixelForm, PixelLayers, PixelSums, PixelValue, SumFormat, SumScale, Window,
+};
 use photoncard_picture::layer::Layers;
+use photoncard_shared::message::{COVERAGE_STEPS, IdentityCoverage};
 use proptest::prelude::{ProptestConfig, any, proptest};
 
 const WINDOW: Window = Window { x0: 3, x1: 20, y0: 5, y1: 45 };
@@ -28,12 +32,12 @@ fn value(x: u32, y: u32) -> PixelValue {
 const FORMAT: SumFormat = SumFormat {
     samples: 1,
     probes: 0,
-    layers: false,
+    form: PixelForm::PLAIN,
     scale: SumScale { radiance: 1.0, depth: 1.0 / 1024.0 },
 };
 
 fn write_pixel(film: &mut Film, x: u32, y: u32, pixel: PixelValue, layers: PixelLayers) {
-    let sums = film.format().sums(&FilmPixel { pixel, layers });
+    let sums = film.format().sums(&FilmPixel { pixel, layers, ..FilmPixel::default() });
     film.write(x, y, &sums).unwrap();
 }
 
@@ -48,7 +52,7 @@ fn film() -> Film {
 }
 
 fn content<'a>(film: &'a Film, layers: &'a Layers) -> Content<'a> {
-    Content { film, layers, denoised: None }
+    Content::new(film, layers)
 }
 
 fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::path::PathBuf) {
@@ -210,7 +214,7 @@ fn requested_layers_are_in_the_file() {
         caustic: [3.5, 4.0, 4.5],
         gathers: 2049.0,
     };
-    let format = SumFormat { layers: true, samples: 2100, ..FORMAT };
+    let format = SumFormat { form: PixelForm::LAYERED, samples: 2100, ..FORMAT };
     let mut film = Film::new(1, 1, Window::full(1, 1), format).unwrap();
     write_pixel(&mut film, 0, 0, value(3, 5), layers);
     let written = |list: &str, format| {
@@ -226,7 +230,7 @@ fn requested_layers_are_in_the_file() {
             ["B", "G", "N.X", "N.Y", "N.Z", "R", "direct.B", "direct.G", "direct.R"]
         );
         let all = written("all", format);
-        assert_eq!(all.len(), 20);
+        assert_eq!(all.len(), 24);
         let channel = |name: &str| all.iter().find(|(other, ..)| other == name).unwrap();
         for (name, is_single, value) in [
             ("direct.R", is_float, 0.5),
@@ -248,7 +252,8 @@ fn denoised_radiance_is_a_layer_beside_the_rendered_one() {
     let path = folder.path().join("denoised.exr");
     let film = film();
     let denoised: Vec<_> = (0..film.pixels().len()).map(|index| [index as f32, 0.5, 2.0]).collect();
-    let content = Content { film: &film, layers: &Layers::NONE, denoised: Some(&denoised) };
+    let layers = Layers::NONE;
+    let content = Content { denoised: Some(&denoised), ..content(&film, &layers) };
     write(&path, &content, "{}", SampleFormat::Float).unwrap();
     let found = channels(&path);
     let names: Vec<_> = found.iter().map(|(name, ..)| name.as_str()).collect();
@@ -365,4 +370,71 @@ proptest! {
         fs::write(&path, &bytes).unwrap();
         drop(read(&path, Shown::Rendered));
     }
+}
+
+/// Film of three pixels with coverage by identity, and the names of the identities.
+fn covered() -> (Film, Identities) {
+    let form = PixelForm { position: true, coverage: true, identities: true, ..PixelForm::PLAIN };
+    let format = SumFormat { form, samples: 2, ..FORMAT };
+    let mut film = Film::new(3, 1, Window::full(3, 1), format).unwrap();
+    for (x, shares) in (0..).zip([&[(0, 2)][..], &[(2, 1), (1, 0)], &[]]) {
+        let mut identities = IdentityCoverage::NONE;
+        shares.iter().for_each(|&(identity, share)| identities.add(identity, share * COVERAGE_STEPS));
+        let sums = PixelSums {
+            light: [1 << 40; 3],
+            coverage: Some(identities.total()),
+            identities: Some(identities),
+            position: Some([3 << 16, 0, -1 << 16]),
+            surfaces: shares.len() as u32,
+            ..PixelSums::default()
+        };
+        film.write(x, 0, &sums).unwrap();
+    }
+    let [objects, materials] =
+        [["chair", "tisch \"ü\""], ["wood", "steel"]].map(|names| names.map(str::to_owned).to_vec());
+    (film, Identities::new(objects, materials, vec![[0, 0], [0, 1], [1, 1]]).unwrap())
+}
+
+/// Attributes of mattes are in a hash map while a file is encoded; in the file they are sorted.
+#[test]
+fn files_with_mattes_and_alpha_have_equal_bytes_and_are_read() {
+    let (mut film, identities) = covered();
+    film.set_origin([100.0, 0.0, 0.0]);
+    let layers: Layers = "alpha,position,object,material".parse().unwrap();
+    let content = Content { is_transparent: true, identities: Some(&identities), ..content(&film, &layers) };
+    let path = std::path::Path::new("picture.exr");
+    let encoded = || bytes(path, &content, "{\"spp\":2}", SampleFormat::Half).unwrap();
+    let first = encoded();
+    assert!((0..20).all(|_| encoded() == first));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    std::fs::write(&path, &first).unwrap();
+    assert!(is_intact(&path));
+    let picture = read(&path, Shown::Rendered).unwrap();
+    assert_eq!(picture.alpha, Some(vec![1.0, 0.5, 0.0]));
+    assert_eq!(picture.provenance.as_deref(), Some("{\"spp\":2}"));
+    let image = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
+    let layer = &image.layer_data[0];
+    let channel = |name: &str| {
+        let found = layer.channel_data.list.iter().find(|channel| channel.name.eq(name)).unwrap();
+        assert_eq!(
+            matches!(found.sample_data, FlatSamples::F32(_)),
+            name != "A" && name != "alpha.Y",
+            "{name}"
+        );
+        found.sample_data.values_as_f32().collect::<Vec<f32>>()
+    };
+    assert_eq!(channel("alpha.Y"), [1.0, 0.5, 0.0]);
+    assert_eq!(channel("P.X"), [100.0 + 3.0 / 1024.0, 100.0 + 1.5 / 1024.0, 0.0]);
+    assert_eq!(channel("CryptoObject00.g"), [1.0, 0.5, 0.0]);
+    assert_eq!(channel("CryptoMaterial00.g"), [1.0, 0.5, 0.0]);
+    let [chair, table, none] = channel("CryptoObject00.r")[..] else { panic!("three pixels") };
+    assert!(chair != table && chair.is_normal() && table.is_normal() && none == 0.0);
+    assert_eq!(channel("CryptoObject05.a"), [0.0; 3]);
+    let manifest = layer.attributes.other.iter().find(|&(name, _)| name.eq("cryptomatte/3ae39a5/manifest"));
+    let Some((_, AttributeValue::Text(manifest))) = manifest else { panic!("there is a manifest") };
+    let names: std::collections::BTreeMap<String, String> =
+        serde_json::from_str(&manifest.to_string()).unwrap();
+    assert_eq!(names["chair"], format!("{:08x}", chair.to_bits()));
+    assert_eq!(names["tisch \"ü\""], format!("{:08x}", table.to_bits()));
 }

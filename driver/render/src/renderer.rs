@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{PhotonSettings, check_image};
+use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::{Film, FilmError};
 use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
@@ -19,6 +20,8 @@ use crate::partial::{PartialRender, PartialSettings};
 pub struct Rendering {
     /// Pixels of the picture.
     pub film: Film,
+    /// Names for the picture's mattes; `None` for a picture without mattes.
+    pub identities: Option<Arc<Identities>>,
     /// Statistics of the work.
     pub statistics: Statistics,
     /// File of finished tiles. The caller should remove it after writing the picture.
@@ -145,6 +148,7 @@ impl Renderer {
         settings.check_budgets(&cards.budgets())?;
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
+        film.set_origin(scene.offset.to_array());
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
@@ -176,7 +180,19 @@ impl Renderer {
         let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
         outputs.base.as_ref().map_or(Ok(()), |base| film.add(base)).map_err(not_more(settings))?;
         let partial = outputs.finish(&film);
-        Ok(Rendering { film, statistics, partial })
+        let identities = kept.as_ref().and_then(|kept| kept.prepared.identities.clone());
+        let identities = identities.filter(|_| settings.picture.layers.have_mattes());
+        Ok(Rendering { film, identities, statistics, partial })
+    }
+}
+
+/// Creates the error of mattes of a prepared scene without identities.
+fn without_identities(settings: &RenderSettings) -> RenderError {
+    RenderError::Setting {
+        field: "picture.layers",
+        value: settings.picture.layers.to_string(),
+        reason: "the scene was prepared without the identities of objects and materials".into(),
+        remedy: "prepare the scene with these layers, or leave object and material out".into(),
     }
 }
 
@@ -218,9 +234,12 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Returns whether the card image is of this scene, with the photons of the settings.
+    /// Returns whether the card image is of this scene, with the photons of the settings, and has the
+    /// identities that their mattes need.
     fn is_of(&self, scene: &Scene, settings: &RenderSettings) -> bool {
-        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings(scene)
+        self.scene == scene.checksum_without_cameras()
+            && self.photons == settings.photon_settings(scene)
+            && (self.prepared.identities.is_some() || !settings.picture.layers.have_mattes())
     }
 }
 
@@ -245,8 +264,15 @@ impl Source {
         if let Some(kept) = kept.take_if(|kept| choose.is_none() && kept.is_of(scene, settings)) {
             return Ok((settings.clone(), Self::Kept(Box::new(kept))));
         }
+        let has_mattes = settings.picture.layers.have_mattes();
+        if has_mattes && scene.stored_triangles().next().is_none() {
+            return Err(without_identities(settings));
+        }
         let packing = Instant::now();
-        let packed = PackedScene::new(scene)?;
+        let packed = match has_mattes {
+            true => PackedScene::with_identities(scene)?,
+            false => PackedScene::new(scene)?,
+        };
         times.hierarchy = packing.elapsed().as_secs_f64();
         times.pack = times.hierarchy;
         let Some(choose) = choose else { return Ok((settings.clone(), Self::Packed(Box::new(packed)))) };

@@ -8,6 +8,7 @@ use photoncard_cards::scheduler::TileCounts;
 use photoncard_cards::session::LinkBytes;
 use photoncard_map::pack::{CardImage, PackedScene};
 use photoncard_map::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_photons};
+use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::Film;
 use photoncard_picture::sink::TileSink;
 use photoncard_scene::Scene;
@@ -71,6 +72,8 @@ pub(super) struct Outcome {
 #[derive(Clone)]
 pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
+    /// Names of the image's identities; `None` for an image without identities.
+    pub(super) identities: Option<Arc<Identities>>,
     /// Maximum distance of a gather, metres.
     pub(super) max_distance: f32,
     /// Parameters of gathers in the caustic map.
@@ -104,6 +107,7 @@ pub(super) fn prepare(
         }
         !observer.is_stopped()
     };
+    let identities = packed.identities();
     let mapped = map_photons(packed, &photon_settings, &progress)?;
     fit(&|budget| Ok(photon_map::check_image(&mapped.image, budget)?))?;
     let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
@@ -113,7 +117,7 @@ pub(super) fn prepare(
     times.discs = measuring.as_secs_f64();
     times.irradiance = estimating.as_secs_f64();
     let MappedImage { image, max_distance, caustics, paths, guiding, .. } = mapped;
-    Ok(Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding })
+    Ok(Prepared { image: Arc::new(image), identities, max_distance, caustics, paths, guiding })
 }
 
 /// Times of the phases, seconds.

@@ -32,6 +32,9 @@ pub struct SceneContents {
     pub tangents: Vec<CornerTangents>,
     /// Materials; the index in [`Triangle::material`] refers to this list.
     pub materials: Vec<Material>,
+    /// Names of the objects: of the file's nodes that show triangles. A picture without layers of objects does
+    /// not depend on them.
+    pub objects: Vec<String>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
     pub textures: Vec<Texture>,
     /// Images of the textures. An image that textures use in two encodings is listed twice.
@@ -108,6 +111,15 @@ impl SceneContents {
     /// [`Self::bulk_checksum`]; `cameras` replace those of the scene.
     pub(crate) fn checksum(&self, mut sum: Checksum, cameras: &[Camera]) -> String {
         sum.update(self.description(cameras).as_bytes());
+        format!("{:08x}", sum.value())
+    }
+
+    pub(crate) fn checksum_of_objects(&self) -> String {
+        let mut sum = Checksum::default();
+        sum.update(format!("{:?}", self.objects).as_bytes());
+        let triangles = self.triangles.iter().map(|triangle| triangle.object);
+        let instances = self.instances.iter().map(|instance| instance.object);
+        triangles.chain(instances).for_each(|object| sum.update(&object.to_le_bytes()));
         format!("{:08x}", sum.value())
     }
 

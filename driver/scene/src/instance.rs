@@ -14,6 +14,8 @@ pub struct Instance {
     pub to_world: Rows,
     /// Inverse of [`Self::to_world`].
     pub to_group: Rows,
+    /// Index into [`SceneContents::objects`](crate::SceneContents::objects).
+    pub object: u32,
 }
 
 /// Minimum and maximum absolute determinant of a transform that can be inverted in single precision.
@@ -43,7 +45,7 @@ impl Instance {
         let of_rounded = DMat4::from_cols_array(&columns(&to_world));
         let to_group = rows(&of_rounded.inverse());
         let is_finite = to_world.iter().chain(&to_group).flatten().all(|value| value.is_finite());
-        (is_finite && !mirrors).then_some(Self { group, to_world, to_group })
+        (is_finite && !mirrors).then_some(Self { group, to_world, to_group, object: 0 })
     }
 
     /// Lower and upper corner of the box around the instance, metres, computed from the corners of its

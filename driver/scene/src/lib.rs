@@ -77,6 +77,7 @@ struct Known {
     bulk: OnceLock<Checksum>,
     checksum: OnceLock<String>,
     without_cameras: OnceLock<String>,
+    objects: OnceLock<String>,
     is_specular: OnceLock<bool>,
 }
 
@@ -110,17 +111,18 @@ impl Scene {
     }
 
     /// Creates a scene that has cameras and an offset, but no triangles. Its methods return the given values:
-    /// `checksum` and `checksum_without_cameras` those in `checksums`, [`Self::is_specular`] the last
-    /// argument.
+    /// `checksum`, `checksum_without_cameras` and `checksum_of_objects` those in `checksums`,
+    /// [`Self::is_specular`] the last argument.
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,
-        checksums: [String; 2],
+        checksums: [String; 3],
         is_specular: bool,
     ) -> Self {
-        let [checksum, without_cameras] = checksums.map(OnceLock::from);
+        let [checksum, without_cameras, objects] = checksums.map(OnceLock::from);
         let contents = SceneContents { cameras, offset, ..SceneContents::default() };
-        let known = Known { checksum, without_cameras, is_specular: is_specular.into(), ..Known::default() };
+        let is_specular = is_specular.into();
+        let known = Known { checksum, without_cameras, objects, is_specular, ..Known::default() };
         Self { contents, known }
     }
 
@@ -139,6 +141,12 @@ impl Scene {
     /// everything that determines the scene's binary image in a card's memory.
     pub fn checksum_without_cameras(&self) -> &str {
         self.known.without_cameras.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &[]))
+    }
+
+    /// CRC-32C of the objects' names, and of the object of each triangle and instance, as eight hexadecimal
+    /// digits.
+    pub fn checksum_of_objects(&self) -> &str {
+        self.known.objects.get_or_init(|| self.contents.checksum_of_objects())
     }
 
     fn bulk_checksum(&self) -> Checksum {

@@ -100,7 +100,8 @@ impl SceneContents {
         let to_world = instance.to_world;
         let place = move |vertex: Vec3| placed_point(&to_world, vertex.to_array()).into();
         let group = self.groups[instance.group as usize].iter();
-        group.map(move |triangle| Triangle { vertices: triangle.vertices.map(place), ..*triangle })
+        let object = instance.object;
+        group.map(move |triangle| Triangle { vertices: triangle.vertices.map(place), object, ..*triangle })
     }
 
     /// Adds the triangles of an instance in world space, with transformed copies of the group's attributes.

@@ -17,12 +17,15 @@ pub struct Triangle {
     pub material: u32,
     /// Index into [`Scene::attributes`](super::SceneContents::attributes), or [`NO_ATTRIBUTES`].
     pub attributes: u32,
+    /// Index into [`Scene::objects`](super::SceneContents::objects); without meaning for a triangle of a
+    /// group.
+    pub object: u32,
 }
 
 impl Triangle {
     /// Creates a triangle without attributes.
     pub fn new(vertices: [Vec3; 3], material: u32) -> Self {
-        Self { vertices, material, attributes: NO_ATTRIBUTES }
+        Self { vertices, material, attributes: NO_ATTRIBUTES, object: 0 }
     }
 
     /// Cross product of two edges: the direction of the geometric normal, with a length of twice the area in

@@ -2,6 +2,7 @@
 
 use photoncard_shared::budget::{Budget, MAX_BINS};
 use photoncard_shared::image::{Header, SectionKind};
+use photoncard_shared::layout::LEAF_TRIANGLES;
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Parameter, Radiance};
 
 use crate::chip::least_waiting_lines;
@@ -41,6 +42,7 @@ pub(super) fn check_frame(
         (Parameter::Queue, frame.queue >= 1),
         (Parameter::InFlight, frame.in_flight >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
+        (Parameter::Identities, !frame.identities || has_identities(header)),
         (
             Parameter::Caustics,
             frame
@@ -62,6 +64,13 @@ fn is_irradiance_error(error: f32) -> bool {
 fn has_irradiance(header: &Header) -> bool {
     let holds = |kind| header.section(kind).records > 0;
     holds(SectionKind::IrradianceLeaves) || !holds(SectionKind::Photons) && !holds(SectionKind::PhotonLeaves)
+}
+
+/// Returns true if a card image has identities of all its triangles, or has no triangles.
+fn has_identities(header: &Header) -> bool {
+    let [leaves, identities] =
+        [SectionKind::Triangles, SectionKind::Identities].map(|kind| header.section(kind).records);
+    u64::from(identities) >= u64::from(leaves) * LEAF_TRIANGLES as u64
 }
 
 /// Minimum error bound of interpolated irradiance. A smaller bound would lie below the rounding errors of

@@ -14,7 +14,7 @@ use photoncard_shared::message::{Fault, FrameParameters, PROBES};
 
 use super::adaptive::{self, Probes};
 use super::buffers::Shared;
-use super::finished_pixel::{Completion, FinishedPixel};
+use super::finished_pixel::{Completion, FinishedPixel, FurtherSums, PixelView};
 use super::flight::Flight;
 use super::light::{Component, PixelLight};
 use super::pixels::{allowed_error_at, direct_light, per_unit, pixel_point, seen_sample};
@@ -23,9 +23,10 @@ use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
-use crate::render::eye::{Sight, View};
+use crate::render::eye::{FirstHit, Sight, View};
 use crate::render::features::{Features, features};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
+use crate::scene::read_identity;
 use crate::slot::Slot;
 
 /// Purpose for which the light of a path is computed.
@@ -64,7 +65,11 @@ impl<K: ChipKind> Flight<K> {
         self.position.index = pixel;
         let is_plain = self.pass() == Pass::CompletePlain;
         let stored = self.sum(pixel).map(|number| shared.sums.light(frame, (flight, number))).transpose()?;
-        let mut completion = self.completion.take().unwrap_or_else(|| {
+        let begun = self.completion.take();
+        if begun.is_none() {
+            self.further = FurtherSums::of_frame(frame);
+        }
+        let mut completion = begun.unwrap_or_else(|| {
             let probes_first = is_plain && adaptive::needs_probes(frame);
             Completion::new(
                 stored.unwrap_or(PixelLight::NONE),
@@ -90,7 +95,8 @@ impl<K: ChipKind> Flight<K> {
             return Ok(None);
         }
         self.position.index += 1;
-        let Completion { light, view, lambertian, interpolated, .. } = completion;
+        let Completion { light, seen, lambertian, interpolated, .. } = completion;
+        let view = PixelView { seen, further: self.further };
         self.counters.lambertian_samples += u64::from(lambertian);
         self.counters.interpolated_samples += u64::from(interpolated);
         Ok(Some(FinishedPixel { tile: self.tile.id, index: self.index_in_tile(pixel), light, view }))
@@ -139,14 +145,16 @@ impl<K: ChipKind> Flight<K> {
         let pass = self.pass();
         let context = &mut job.context(&mut self.counters);
         let has_rays = match eye::view(context, at)? {
-            Sight::Background { radiance, depth } => {
+            Sight::Background { radiance, hit } => {
                 let light = radiance * per_unit(context);
                 completion.add(context.frame, as_what, Component::Direct, light);
-                if let Some(depth) = depth
-                    && completion.path == 0
-                    && matches!(as_what, Use::Term(_))
+                if let Some((depth, first)) = hit
+                    && let Use::Term(weight) = as_what
                 {
-                    completion.view.add(&context.scene.header, &Features::NOTHING, depth);
+                    if completion.path == 0 {
+                        completion.seen.add(&context.scene.header, &Features::NOTHING, depth);
+                    }
+                    add_hit(context, &mut self.further, (completion.path, weight), &first)?;
                 }
                 false
             }
@@ -155,9 +163,12 @@ impl<K: ChipKind> Flight<K> {
                 let has_rays = light_path::<K, M>(context, &self.cache, path, (as_what, &mut *completion))?;
                 // A plain pass drops a pixel that has gather rays, and another pass completes it.
                 let is_kept = !(has_rays && pass == Pass::CompletePlain);
-                if is_kept && completion.path == 0 && matches!(as_what, Use::Term(_)) {
-                    let features = features(context, at, &view)?;
-                    completion.view.add(&context.scene.header, &features, view.depth);
+                if is_kept && let Use::Term(weight) = as_what {
+                    if completion.path == 0 {
+                        let features = features(context, at, &view)?;
+                        completion.seen.add(&context.scene.header, &features, view.depth);
+                    }
+                    add_hit(context, &mut self.further, (completion.path, weight), &view.first)?;
                 }
                 has_rays
             }
@@ -193,6 +204,40 @@ impl Completion {
             self.probes.add(light * unit);
         }
     }
+}
+
+/// Adds the first surface that an eye ray hits to the sums that the frame asks for: the position, of a
+/// sample's first path alone, and the coverage. `path` is the number of the path in its sample, and its
+/// weight.
+#[inline(always)]
+fn add_hit<M: MemoryPort>(
+    context: &mut Context<M>,
+    further: &mut FurtherSums,
+    path: (u32, f32),
+    hit: &FirstHit,
+) -> Result<(), Fault> {
+    let FrameParameters { position, coverage, identities, .. } = *context.frame;
+    if position || coverage || identities { add_asked(context, further, path, hit) } else { Ok(()) }
+}
+
+/// Does [`add_hit`] in a frame that asks for positions, coverage or identities.
+#[cold]
+#[inline(never)]
+fn add_asked<M: MemoryPort>(
+    context: &mut Context<M>,
+    further: &mut FurtherSums,
+    (path, weight): (u32, f32),
+    hit: &FirstHit,
+) -> Result<(), Fault> {
+    if path == 0 {
+        further.add_position(&context.scene.header, hit.position);
+    }
+    let identity = match context.frame.identities {
+        true => Some(read_identity(context.scene, context.memory, hit.id)?),
+        false => None,
+    };
+    further.cover(weight, identity);
+    Ok(())
 }
 
 /// Adds emission and interpolated irradiance of a path whose sample has `paths` paths. For a probe, or a path

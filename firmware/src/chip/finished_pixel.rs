@@ -3,7 +3,8 @@
 use glam::Vec3;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{
-    ALBEDO_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
+    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, FrameParameters, IdentityCoverage, LayerSums, NORMAL_STEPS,
+    PixelSums,
 };
 
 use super::adaptive::Probes;
@@ -20,7 +21,7 @@ pub struct FinishedPixel {
     pub index: u32,
     /// Sums of the pixel's light.
     pub light: PixelLight,
-    /// Sums of the pixel's albedo, normal and depth.
+    /// Other sums of the pixel.
     pub view: PixelView,
 }
 
@@ -31,16 +32,56 @@ impl FinishedPixel {
     }
 }
 
-/// Sums of albedo, normal and depth over the samples of a pixel.
+/// Sums over the samples of a pixel, except those of light.
 #[derive(Clone, Copy, Debug)]
-pub struct PixelView(PixelSums);
+pub struct PixelView {
+    pub(super) seen: SeenSums,
+    pub(super) further: FurtherSums,
+}
 
 impl PixelView {
-    pub(super) const NOTHING: Self = Self(PixelSums::NOTHING);
+    /// Combines the sums with sums of light. With layers, `light` is a sum for each component, then the count
+    /// of gathers. Without layers it is a single sum.
+    pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
+        let SeenSums { albedo, normal, depth, surfaces } = self.seen;
+        let FurtherSums { position, coverage, identities } = self.further;
+        let view = PixelSums {
+            albedo,
+            normal,
+            depth,
+            surfaces,
+            position,
+            coverage,
+            identities,
+            ..PixelSums::NOTHING
+        };
+        match light {
+            [direct, indirect, caustic, gathers] => {
+                let [direct, indirect, caustic] = [direct, indirect, caustic].map(ColourSum::bits);
+                let gathers = gathers.value().x as u32;
+                view.with_layers(LayerSums { direct, indirect, caustic, gathers })
+            }
+            _ => view.with_light(light.first().map_or([0; 3], ColourSum::bits)),
+        }
+    }
+}
+
+/// Sums of albedo, normal and depth over the samples of a pixel, and the number of samples that see a
+/// surface ([`PixelSums`]).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SeenSums {
+    albedo: [u32; 3],
+    normal: [i32; 3],
+    depth: i64,
+    surfaces: u32,
+}
+
+impl SeenSums {
+    pub(super) const NOTHING: Self = Self { albedo: [0; 3], normal: [0; 3], depth: 0, surfaces: 0 };
 
     /// Adds a sample: the features of the surface that it sees, and the surface's depth, metres.
     pub(super) fn add(&mut self, header: &Header, features: &Features, depth: f32) {
-        let Self(sums) = self;
+        let sums = self;
         let albedo = features.albedo.clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
         let normal = features.normal * NORMAL_STEPS as f32;
         // Conversions round towards zero and saturate. The maximum number of samples does not overflow the
@@ -57,17 +98,46 @@ impl PixelView {
         sums.depth = sums.depth.saturating_add(depth as i64);
         sums.surfaces = sums.surfaces.saturating_add(1);
     }
+}
 
-    /// Combines albedo, normal and depth with sums of light. With layers, `light` is a sum for each
-    /// component, then the count of gathers. Without layers it is a single sum.
-    pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
-        match light {
-            [direct, indirect, caustic, gathers] => {
-                let [direct, indirect, caustic] = [direct, indirect, caustic].map(ColourSum::bits);
-                let gathers = gathers.value().x as u32;
-                self.0.with_layers(LayerSums { direct, indirect, caustic, gathers })
-            }
-            _ => self.0.with_light(light.first().map_or([0; 3], ColourSum::bits)),
+/// Sums that only some frames ask for, of the first surfaces that eye rays hit ([`PixelSums`]).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FurtherSums {
+    position: Option<[i64; 3]>,
+    coverage: Option<u32>,
+    identities: Option<IdentityCoverage>,
+}
+
+impl FurtherSums {
+    /// Sums of a frame that asks for none.
+    pub(super) const NONE: Self = Self { position: None, coverage: None, identities: None };
+
+    /// Sums over no samples, those that a frame asks for.
+    pub(super) fn of_frame(frame: &FrameParameters) -> Self {
+        Self {
+            position: frame.position.then_some([0; 3]),
+            coverage: frame.coverage.then_some(0),
+            identities: frame.identities.then_some(IdentityCoverage::NONE),
+        }
+    }
+
+    /// Adds the position of a hit, metres, if the frame asks for positions.
+    pub(super) fn add_position(&mut self, header: &Header, position: Vec3) {
+        let Some(sums) = &mut self.position else { return };
+        let steps = position * (DEPTH_STEPS as f32 / header.sum_scale().depth);
+        for (sum, steps) in sums.iter_mut().zip(steps.to_array()) {
+            *sum = sum.saturating_add(steps as i64);
+        }
+    }
+
+    /// Adds a path with the weight `weight` whose eye ray hits a surface of the identity `identity`.
+    pub(super) fn cover(&mut self, weight: f32, identity: Option<u32>) {
+        let covered = (weight * COVERAGE_STEPS as f32 + 0.5) as u32;
+        if let Some(sum) = &mut self.coverage {
+            *sum = sum.saturating_add(covered);
+        }
+        if let (Some(sums), Some(identity)) = (&mut self.identities, identity) {
+            sums.add(identity, covered);
         }
     }
 }
@@ -75,7 +145,7 @@ impl PixelView {
 /// State of the pixel that is being completed.
 pub(super) struct Completion {
     pub(super) light: PixelLight,
-    pub(super) view: PixelView,
+    pub(super) seen: SeenSums,
     /// Number of the next sample among all samples of the pixel.
     pub(super) sample: u32,
     /// Number of the next path in its sample.
@@ -94,7 +164,7 @@ impl Completion {
     pub(super) const fn new(light: PixelLight, sample: u32) -> Self {
         Self {
             light,
-            view: PixelView::NOTHING,
+            seen: SeenSums::NOTHING,
             sample,
             path: 0,
             of_path: Vec3::ZERO,

@@ -7,7 +7,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
 
 use super::adaptive::{self, Paths};
-use super::finished_pixel::Completion;
+use super::finished_pixel::{Completion, FurtherSums};
 use super::position::{Block, Pass, Position};
 use crate::gather::{GatherTarget, PointIndex};
 use crate::irradiance_cache::{IrradianceCache, Window};
@@ -47,6 +47,9 @@ pub(super) struct Flight<K: ChipKind> {
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
     /// State of the pixel that is being completed, or whose probes are traced.
     pub(super) completion: Slot<Completion>,
+    /// Sums of the pixel that is being completed that only some frames ask for. They are not part of
+    /// [`Completion`], which is moved for each path.
+    pub(super) further: FurtherSums,
 }
 
 impl<K: ChipKind> Vacant for Flight<K> {
@@ -63,6 +66,7 @@ impl<K: ChipKind> Vacant for Flight<K> {
         sums: Buffer::EMPTY,
         paths: Buffer::EMPTY,
         completion: Slot::Empty,
+        further: FurtherSums::NONE,
     };
 }
 

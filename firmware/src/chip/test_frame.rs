@@ -29,5 +29,9 @@ pub(super) fn frame() -> FrameParameters {
         in_flight: 3,
         keep_records: false,
         adaptive_threshold: None,
+        transparent: false,
+        position: false,
+        coverage: false,
+        identities: false,
     }
 }

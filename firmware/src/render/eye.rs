@@ -1,6 +1,7 @@
 //! Eye rays, and the eye paths that follow them through perfectly specular surfaces.
 
 use glam::Vec3;
+use photoncard_shared::layout::TriangleId;
 use photoncard_shared::message::{Fault, Projection};
 
 use super::pixel_filter::place;
@@ -44,6 +45,17 @@ pub struct View {
     pub sample: CameraSample,
     /// [Depth](camera::depth) of the eye ray's hit, metres.
     pub depth: f32,
+    /// First surface that the eye ray hits.
+    pub first: FirstHit,
+}
+
+/// First surface that an eye ray hits, whatever its material.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstHit {
+    /// The triangle.
+    pub id: TriangleId,
+    /// Position of the hit, metres.
+    pub position: Vec3,
 }
 
 /// End of an eye path.
@@ -54,11 +66,12 @@ pub enum Sight {
     Surface(View),
     /// The environment.
     Background {
-        /// Radiance, W/(sr m^2), times the throughput of the eye path. It is zero without an environment, and
-        /// for a path that contributes nothing.
+        /// Radiance, W/(sr m^2), times the throughput of the eye path. It is zero without an environment, for
+        /// a path that contributes nothing, and in a transparent frame if the eye ray itself leaves the scene.
         radiance: Vec3,
-        /// [Depth](camera::depth) of the eye ray's hit, metres; `None` if the ray itself leaves the scene.
-        depth: Option<f32>,
+        /// [Depth](camera::depth) of the eye ray's hit, metres, and the hit; `None` if the ray itself leaves
+        /// the scene.
+        hit: Option<(f32, FirstHit)>,
     },
 }
 
@@ -97,17 +110,18 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut surface = Surface::NOWHERE;
     read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut surface)?;
+    let first_hit = FirstHit { id: hit.id, position: surface.position };
     let is_first = surface.specular.is_none();
     // Only the eye path can repeat a random choice between layers.
     let is_stored = is_first && surface.probability >= 1.0;
     let per_distance = camera::depth_per_distance(&context.frame.camera, ray.direction);
     if !is_first {
         let end = path.follow(context, &mut surface, &mut hit, &random)?;
-        let depth = Some(path.first_distance * per_distance);
+        let hit = Some((path.first_distance * per_distance, first_hit));
         match end {
             PathEnd::Surface => {}
-            PathEnd::Escaped => return background(context, &path, depth),
-            PathEnd::Lost => return Ok(Sight::Background { radiance: Vec3::ZERO, depth }),
+            PathEnd::Escaped => return background(context, &path, hit),
+            PathEnd::Lost => return Ok(Sight::Background { radiance: Vec3::ZERO, hit }),
         }
     }
     Ok(Sight::Surface(View {
@@ -120,6 +134,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
         seen: if is_stored { Seen::new(&hit) } else { None },
         is_first,
         sample,
+        first: first_hit,
     }))
 }
 
@@ -127,10 +142,13 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
 fn background<M: MemoryPort>(
     context: &mut Context<M>,
     path: &SpecularPath,
-    depth: Option<f32>,
+    hit: Option<(f32, FirstHit)>,
 ) -> Result<Sight, Fault> {
+    if hit.is_none() && context.frame.transparent {
+        return Ok(Sight::Background { radiance: Vec3::ZERO, hit });
+    }
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
-    Ok(Sight::Background { radiance: radiance * path.throughput, depth })
+    Ok(Sight::Background { radiance: radiance * path.throughput, hit })
 }
 
 /// Reads the surface at a stored hit of the eye ray of `sample` into `surface`.

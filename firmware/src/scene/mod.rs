@@ -7,6 +7,7 @@ mod corners;
 mod coverage;
 mod cut_out;
 mod flat_glass;
+mod identity;
 pub mod light;
 mod materials;
 mod normal_map;
@@ -23,6 +24,7 @@ mod triangles;
 pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
 pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, for_each_hit, transmittance};
 pub use cut_out::is_there;
+pub use identity::read_identity;
 pub use reflection::{
     DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
 };

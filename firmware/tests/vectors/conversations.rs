@@ -350,6 +350,13 @@ fn states() -> Vec<String> {
     talk.say("a tile of a pixel", &[tile(1, 1, 1)], "Pixels 1 0 112, TileDone 1");
     talk.say("a tile of 9 pixels", &[tile(1, 3, 3)], "Pixels 1 0 896, Pixels 1 8 112, TileDone 1");
     talk.say("more than a fourth of the budget's pixels", &[tile(2, 13, 5)], "Tile 2");
+    let further = FrameParameters { position: true, coverage: true, transparent: true, ..FRAME };
+    talk.say("a frame with positions and coverage", &[Command::BeginFrame(further)], "FrameAccepted");
+    talk.say("a tile of a pixel of it", &[tile(1, 1, 1)], "Pixels 1 0 88, TileDone 1");
+    let identities = FrameParameters { identities: true, ..FRAME };
+    let begin_identities = [Command::BeginFrame(identities)];
+    talk.say("identities of an image without triangles", &begin_identities, "FrameAccepted");
+    talk.say("a tile of a pixel of it", &[tile(1, 1, 1)], "Pixels 1 0 156, TileDone 1");
 
     talk.load(bare);
     talk.say("a frame of it", &[frame], "FrameAccepted");

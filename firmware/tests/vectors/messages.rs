@@ -126,6 +126,10 @@ pub(crate) const FRAME: FrameParameters = FrameParameters {
     in_flight: u32::MAX,
     keep_records: false,
     adaptive_threshold: None,
+    transparent: false,
+    position: false,
+    coverage: false,
+    identities: false,
 };
 
 /// A frame with all options and no field of another's value.
@@ -161,6 +165,10 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     in_flight: 3,
     keep_records: true,
     adaptive_threshold: Some(0.0625),
+    transparent: true,
+    position: true,
+    coverage: true,
+    identities: true,
 };
 
 fn projected(projection: &Projection) -> String {
@@ -210,6 +218,10 @@ fn frame(frame: &FrameParameters) -> Vec<(&'static str, String)> {
         ("in_flight", frame.in_flight.to_string()),
         ("keep_records", u8::from(frame.keep_records).to_string()),
         ("adaptive_threshold", option(frame.adaptive_threshold)),
+        ("transparent", u8::from(frame.transparent).to_string()),
+        ("position", u8::from(frame.position).to_string()),
+        ("coverage", u8::from(frame.coverage).to_string()),
+        ("identities", u8::from(frame.identities).to_string()),
     ]
 }
 
@@ -304,7 +316,7 @@ fn counters() -> ([u64; 26], Counters) {
 }
 
 /// Sums of a pixel with a light of its own in each layer.
-fn pixel(layers: bool) -> Vec<u8> {
+fn pixel(form: PixelForm) -> Vec<u8> {
     let view = PixelSums {
         albedo: [1 << 19, 1 << 18, 3],
         normal: [1 << 18, -5, i32::MIN],
@@ -312,7 +324,17 @@ fn pixel(layers: bool) -> Vec<u8> {
         surfaces: 8,
         ..PixelSums::NOTHING
     };
-    let sums = if layers {
+    let mut identities = IdentityCoverage::NONE;
+    [(3, 1 << 19), (0, 5), (7, 1 << 18)]
+        .into_iter()
+        .for_each(|(identity, coverage)| identities.add(identity, coverage));
+    let view = PixelSums {
+        position: form.position.then_some([3 << 16, -4, 5]),
+        coverage: form.coverage.then_some(7 << 18),
+        identities: form.identities.then_some(identities),
+        ..view
+    };
+    let sums = if form.layers {
         let [direct, indirect, caustic] = [[1 << 40, 2, 3], [4, 5, 6], [7, 8, 9]];
         view.with_layers(LayerSums { direct, indirect, caustic, gathers: 6 })
     } else {
@@ -334,8 +356,9 @@ fn replies() -> Vec<String> {
     all.push(vector(("host", "Checksums"), &[("first", "128".into()), ("data", hex(&sum))], &checksums));
     all.push(vector(("host", "ImageAccepted"), &[], &Reply::ImageAccepted));
     all.push(vector(("host", "FrameAccepted"), &[], &Reply::FrameAccepted));
-    for layers in [false, true] {
-        let data = pixel(layers);
+    let coverage = PixelForm { coverage: true, ..PixelForm::PLAIN };
+    for form in [PixelForm::PLAIN, PixelForm::LAYERED, coverage, PixelForm::FULL] {
+        let data = pixel(form);
         let fields = [("id", "300".into()), ("first", "31".into()), ("data", hex(&data))];
         all.push(vector(("host", "Pixels"), &fields, &Reply::Pixels { tile: 300, first: 31, data: &data }));
     }

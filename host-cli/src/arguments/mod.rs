@@ -294,7 +294,7 @@ mod tests {
             ("photoncard tonemap a.exr --threads 4 -o b.png", "of photoncard render"),
             ("photoncard prepare a.glb --jobs 4 -o b.card", "--threads N"),
             ("photoncard view a.glb --output a.png", "--help"),
-            ("photoncard render a.glb --transparent", "background"),
+            ("photoncard render a.glb --film-transparent", "render --transparent"),
             ("photoncard render a.glb a.png", "-o a.png"),
         ] {
             let text = said(line);

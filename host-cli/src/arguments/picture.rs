@@ -102,12 +102,19 @@ pub(crate) struct PictureOptions {
         value_name = "LIST",
         hide_short_help = true,
         help = format!(
-            "Layers of the EXR besides radiance, with commas between them: direct, indirect, caustic, albedo, N, Z, gathers; or all, \
-             or none [default: {}]",
+            "Layers of the EXR besides radiance, with commas between them: {}; or all, or none [default: {}]",
+            Layers::all().to_string().replace(',', ", "),
             Layers::default()
         )
     )]
     pub(super) aov: Option<Layers>,
+    /// Leave the environment out of the background, and write alpha: into the EXR's channel A, beside
+    /// premultiplied R, G and B, and into the PNG
+    ///
+    /// The environment still lights the scene, and is seen in mirrors and through glass, which counts as
+    /// covering the background.
+    #[arg(long, hide_short_help = true)]
+    pub(crate) transparent: bool,
     /// Pixel filter [default: blackman-harris; box with --quality paper]
     #[arg(long, value_parser = choice::<Filter>(), hide_short_help = true)]
     filter: Option<Filter>,
@@ -129,6 +136,7 @@ impl PictureOptions {
             aperture,
             focus,
             aov: _,
+            transparent,
             filter,
         } = self;
         let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
@@ -147,6 +155,7 @@ impl PictureOptions {
             focus: *focus,
             layers: self.layers(),
             filter: filter.unwrap_or(base.filter),
+            transparent: *transparent,
         }
     }
 

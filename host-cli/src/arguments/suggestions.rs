@@ -60,8 +60,8 @@ pub(super) const OF_OTHERS: [Word; 17] = [
     Word { options: OUTPUT, remedy: "the picture is stated by -o OUT.png or -o OUT.exr", commands: WRITE },
     Word { options: OUTPUT, remedy: "the picture is stated by -o OUT.png", commands: &["tonemap"] },
     Word {
-        options: &["--transparent", "--alpha", "--film-transparent"],
-        remedy: "no transparent background is written: where nothing is seen, the layer Z of an EXR is infinite",
+        options: &["--alpha", "--film-transparent"],
+        remedy: "a background without the environment, and alpha, are written by photoncard render --transparent",
         commands: &[],
     },
     Word {
@@ -196,7 +196,7 @@ mod tests {
                 Some("of photoncard render, photoncard view, photoncard farm: the number of chips"),
             ),
             ("--outfile", "tonemap", Some("the picture is stated by -o OUT.png")),
-            ("--alpha", "diff", Some("no transparent")),
+            ("--alpha", "diff", Some("a background")),
             ("a.png", "tonemap", Some("a picture to write is stated by -o a.png")),
             ("a.exr", "tonemap", None),
             ("a.png", "diff", None),

@@ -2,10 +2,11 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
+use photoncard_driver::cryptomatte::Identities;
 use photoncard_driver::denoise::Denoiser;
 use photoncard_driver::exr::{self, Content, SampleFormat};
 use photoncard_driver::film::Film;
@@ -100,10 +101,11 @@ pub(super) fn write(
     let denoiser = denoiser(denoises(options, outputs))?;
     let start = Instant::now();
     // If the denoiser fails, the picture is written without the denoised layer.
-    let (denoised, failure) = match denoised(denoiser, &rendering.film, options.threads) {
-        Ok(denoised) => (denoised, None),
-        Err(failure) => (None, Some(failure)),
-    };
+    let (denoised, failure) =
+        match denoised(denoiser, &rendering.film, options.picture.transparent, options.threads) {
+            Ok(denoised) => (denoised, None),
+            Err(failure) => (None, Some(failure)),
+        };
     let seconds = denoiser.map_or(0.0, |_| start.elapsed().as_secs_f64());
     rendering.statistics.time_s.denoise = seconds;
     rendering.statistics.time_s.total += seconds;
@@ -114,11 +116,14 @@ pub(super) fn write(
     let layers = options.picture.layers();
     let head = |part| {
         let settings = rendering.statistics.provenance.pixels.clone();
-        PartHead::new(part, &rendering.film, settings, &layers, part::arguments())
+        let names = rendering.identities.as_deref();
+        PartHead::new(part, &rendering.film, settings, &layers, names, part::arguments())
     };
     let form = Form {
         part: options.parts.part.map(head),
         layers: layers.clone(),
+        is_transparent: options.picture.transparent,
+        identities: rendering.identities.clone(),
         sample_type: outputs.sample_type(),
         tone: outputs.tone.mapping(),
         denoised,
@@ -166,20 +171,31 @@ pub(crate) fn denoised_by(denoiser: &Denoiser) -> (String, Value) {
     ("denoise".to_owned(), Value::from(denoiser.version()))
 }
 
-/// Denoised radiance of a film, if there is a denoiser.
+/// Denoised radiance of a film, if there is a denoiser. In a transparent picture, pixels without a surface
+/// stay black.
 pub(crate) fn denoised(
     denoiser: Option<&Denoiser>,
     film: &Film,
+    is_transparent: bool,
     threads: Option<usize>,
 ) -> Result<Option<Vec<[f32; 3]>>, Failure> {
     let radiance = denoiser.map(|denoiser| denoiser.radiance(film, threads, &|| false)).transpose();
-    radiance.map_err(|error| Failure::work_error(&error))
+    let mut radiance = radiance.map_err(|error| Failure::work_error(&error))?;
+    if is_transparent && let Some(radiance) = &mut radiance {
+        let uncovered = film.all().zip(radiance).filter(|(pixel, _)| pixel.alpha == 0.0);
+        uncovered.for_each(|(_, radiance)| *radiance = [0.0; 3]);
+    }
+    Ok(radiance)
 }
 
 /// Data that a picture's file has besides the film. Each format uses some of them.
 pub(crate) struct Form {
     /// Layers of an EXR.
     pub(crate) layers: Layers,
+    /// True if the files have alpha.
+    pub(crate) is_transparent: bool,
+    /// Names for the mattes of an EXR; `None` without mattes.
+    pub(crate) identities: Option<Arc<Identities>>,
     /// Type of an EXR's samples.
     pub(crate) sample_type: SampleFormat,
     /// Tone mapping of a PNG.
@@ -200,7 +216,14 @@ pub(crate) fn write_picture(
     let PictureOutput { path, format } = picture;
     match format {
         PictureFormat::Exr => {
-            let content = Content { film, layers: &form.layers, denoised: form.denoised.as_deref() };
+            let Form { layers, is_transparent, identities, denoised, .. } = form;
+            let content = Content {
+                film,
+                layers,
+                denoised: denoised.as_deref(),
+                is_transparent: *is_transparent,
+                identities: identities.as_deref(),
+            };
             exr::write(path, &content, provenance, form.sample_type)
                 .map_err(|error| Failure::work_error(&error))
         }
@@ -210,11 +233,13 @@ pub(crate) fn write_picture(
             let radiance = film.pixels().enumerate().map(|(index, pixel)| {
                 denoised.and_then(|denoised| denoised.get(index)).copied().unwrap_or(pixel.radiance)
             });
+            let alpha = form.is_transparent.then(|| film.all().map(|pixel| pixel.alpha).collect::<Vec<_>>());
+            let alpha = alpha.as_deref();
             if picture.file().is_none() {
-                let bytes = png_bytes(path, size, radiance, form.tone, Some(provenance));
+                let bytes = png_bytes(path, size, radiance, alpha, form.tone, Some(provenance));
                 return write_bytes(&bytes.map_err(|error| Failure::work_error(&error))?);
             }
-            write_png(path, size, radiance, form.tone, Some(provenance))
+            write_png(path, size, radiance, alpha, form.tone, Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
         }
         PictureFormat::Video => Err(video::needless()),

@@ -105,7 +105,7 @@ mod tests {
         let head = |frame: Option<u32>, line: &str| {
             let settings = frame.map(|frame| ("frame".to_owned(), frame.into())).into_iter().collect();
             let command = line.split(' ').map(str::to_owned).collect();
-            PartHead::new(Part::new(1, 8).unwrap(), &film, settings, &Layers::default(), command)
+            PartHead::new(Part::new(1, 8).unwrap(), &film, settings, &Layers::default(), None, command)
         };
         for (frame, given, expected) in [
             (

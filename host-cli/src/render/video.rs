@@ -22,7 +22,7 @@ pub(super) struct Video {
 /// Replaces each video among the outputs by the PNG pictures that it is encoded from, and returns the videos.
 ///
 /// # Errors
-/// If no frames are stated; if a video's name contains `#`, or is that of an input; if a file that photoncard
+/// If no frames are stated; if the pictures are to have alpha; if a video's name contains `#`, or is that of an input; if a file that photoncard
 /// did not write has the name of one of the PNG pictures; or if ffmpeg cannot be started.
 pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let mut videos = Vec::new();
@@ -32,6 +32,14 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
         videos.push(Video { path, pictures });
     }
     let Some(Video { path, pictures }) = videos.first() else { return Ok(videos) };
+    if options.picture.transparent {
+        let text = format!("{} is a video, which has no alpha", path.display());
+        let frames = path.with_extension("####.png");
+        return Err(refusal(
+            text,
+            &format!("leave --transparent out, or write frames: -o {}", frames.display()),
+        ));
+    }
     if let Some(video) = videos.iter().find(|video| numbered(&video.path, 0).is_some()) {
         return Err(of_each_frame(&video.path));
     }

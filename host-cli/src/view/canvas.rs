@@ -5,10 +5,11 @@
 //! not been sent them. A slow page therefore receives fewer and newer tiles, and needs no buffer.
 
 use std::collections::{HashMap, VecDeque};
+use std::iter;
 use std::sync::Arc;
 
 use photoncard_driver::film::FilmPixel;
-use photoncard_driver::layer::{Layer, Layers};
+use photoncard_driver::layer::Layer;
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::counters::Counters;
 
@@ -20,11 +21,25 @@ pub(super) enum Shown {
 }
 
 impl Shown {
+    /// All quantities that a page can show: radiance, and the layers with channels.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        let layers = Layer::ALL.into_iter().filter(|layer| !layer.channels().is_empty());
+        iter::once(Self::Radiance).chain(layers.map(Self::Layer))
+    }
+
+    /// Name of the quantity in messages.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Radiance => "radiance",
+            Self::Layer(layer) => layer.name(),
+        }
+    }
+
     /// Returns whether this is a layer that chips render only on request, such as `direct`.
     pub(super) fn is_of_chip(self) -> bool {
         match self {
             Self::Radiance => false,
-            Self::Layer(layer) => layer.name().parse::<Layers>().is_ok_and(|layers| layers.are_of_chip()),
+            Self::Layer(layer) => layer.is_of_chip(),
         }
     }
 }
@@ -260,14 +275,14 @@ impl Canvas {
 
 #[cfg(test)]
 mod tests {
-    use photoncard_driver::film::{PixelLayers, PixelValue, SumFormat};
+    use photoncard_driver::film::SumFormat;
     use photoncard_shared::message::Tile;
 
     use super::*;
 
     fn patch(samples: u32, x: u32, gathers: u64) -> Patch {
         let tile = Tile { id: x, x, y: 0, width: 1, height: 1 };
-        let pixel = FilmPixel { pixel: PixelValue::default(), layers: PixelLayers::default() };
+        let pixel = FilmPixel::default();
         let tile = FinishedTile::of_pixels(tile, [SumFormat::ONE.sums(&pixel)], SumFormat::ONE).unwrap();
         let origin = Origin { version: 1, is_coarse: false, step: 1, samples };
         Patch::new(origin, 0, tile, TileWork { gathers, ..TileWork::default() })

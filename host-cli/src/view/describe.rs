@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::layer::Layer;
 use photoncard_driver::render::{RenderSettings, Statistics};
 use photoncard_driver::scene::{
     Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use serde_json::{Map, Value, json};
 
+use super::canvas::Shown;
 use super::wish::Wish;
 
 /// Name and bounding box of a scene, for the first message to a page.
@@ -27,7 +27,7 @@ impl SceneFacts {
     /// First message to a page. `scene` has the materials and lights before any change by a page. `out` is
     /// the folder of saved pictures, and `steers` whether the page controls the view.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
-        let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
+        let layers = Shown::all().map(Shown::name);
         let cameras = scene.cameras.iter().map(|camera| {
             let mut described = self.camera(camera, scene);
             described["name"] = json!(camera.name);

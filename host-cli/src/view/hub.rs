@@ -184,7 +184,10 @@ fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMappin
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
     let layers = settled.wish.settings.picture.layers.clone();
     let denoised = settled.denoised.clone();
-    let form = Form { layers, sample_type: SampleFormat::Float, tone, denoised, part: None };
+    let is_transparent = settled.wish.settings.picture.transparent;
+    let identities = settled.rendering.identities.clone();
+    let sample_type = SampleFormat::Float;
+    let form = Form { layers, is_transparent, identities, sample_type, tone, denoised, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
     write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())

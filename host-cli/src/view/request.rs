@@ -1,7 +1,6 @@
 //! Messages from pages: JSON in which every name and number is checked.
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::layer::Layer;
 use photoncard_driver::render::Sampling;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_driver::tone_mapping::{ToneCurve, ToneMapping};
@@ -142,8 +141,7 @@ fn view(fields: &Fields) -> Result<View, String> {
 }
 
 fn layer(name: &str) -> Result<Shown, String> {
-    let known = Layer::ALL.into_iter().find(|layer| layer.name() == name).map(Shown::Layer);
-    let known = known.or((name == "radiance").then_some(Shown::Radiance));
+    let known = Shown::all().find(|shown| shown.name() == name);
     known.ok_or_else(|| format!("there is no layer {name:?}"))
 }
 
@@ -252,6 +250,8 @@ impl Fields<'_> {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_driver::layer::Layer;
+
     use super::*;
 
     /// View of the tests' messages.

@@ -111,14 +111,15 @@ impl Wish {
         Self { settings, stated: other.stated, ..self.clone() }
     }
 
-    /// Requests all layers, unless the picture already has a layer that chips render only on request. Returns
-    /// whether the layers have changed.
+    /// Requests all layers that pages show. Returns whether chips have to render more of them.
     pub(super) fn add_layers(&mut self) -> bool {
         let layers = &mut self.settings.picture.layers;
-        !layers.are_of_chip() && {
-            *layers = Layers::all();
-            true
+        let all = layers.and(&Layers::without_mattes());
+        let has_changed = all.form() != layers.form();
+        if has_changed {
+            *layers = all;
         }
+        has_changed
     }
 
     /// Applies the settings that pilot renders have chosen, except those that an option or a page has stated.

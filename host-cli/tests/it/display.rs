@@ -137,7 +137,7 @@ fn a_viewer_receives_the_picture_of_the_file() {
             ("out.exr", picture.width, picture.height)
         );
         assert!(viewed.updates > 2);
-        assert_eq!(viewed.channels.len(), if options.contains(&"--aov=all") { 20 } else { 10 });
+        assert_eq!(viewed.channels.len(), if options.contains(&"--aov=all") { 24 } else { 10 });
         for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
             assert_eq!(viewed.channels[channel], name);
             let pixels: Vec<f32> = picture.pixels.iter().map(|pixel| pixel[channel]).collect();

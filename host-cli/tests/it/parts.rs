@@ -29,9 +29,10 @@ fn merged(room: &Room, arguments: &[&str]) -> Outcome {
 
 #[test]
 fn the_merged_picture_equals_the_file_of_one_render() {
-    for options in
-        [&["--quality", "draft", "--aov", "all"][..], &["--irradiance-cache", "off", "--seed", "5"]]
-    {
+    for options in [
+        &["--quality", "draft", "--aov", "all", "--transparent"][..],
+        &["--irradiance-cache", "off", "--seed", "5"],
+    ] {
         let room = Room::new();
         let whole = [&PICTURE, options, &["-o", "whole.exr", "-o", "whole.png"]].concat();
         room.rendered(&shipped("cornell-glossy.gltf"), &whole);

@@ -27,7 +27,7 @@ fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
     for (prepared, picture) in [
         (
             &["--quality", "draft", "--photons", "900", "--environment", "0.1,0.2,0.3"][..],
-            &["--size", "24x20", "--aov", "all", "--camera-at", "0.1,0.2,3"][..],
+            &["--size", "24x20", "--aov", "all", "--transparent", "--camera-at", "0.1,0.2,3"][..],
         ),
         (
             &[
@@ -68,6 +68,15 @@ fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
         done(&room.run(&["merge", "c.2.part", "c.1.part", "-o", "c.exr"]));
         assert!(room.read("c.exr") == room.read("a.exr"), "{prepared:?}");
     }
+}
+
+#[test]
+fn mattes_of_a_scene_that_was_prepared_without_them_are_refused_with_a_remedy() {
+    let room = Room::new();
+    prepare(&room);
+    let outcome = room.run(&["render", "scene.card", "--prepared", "-o", "a.exr", "--aov", "Z,object"]);
+    refused(&outcome, &["--aov", "Z,object", "prepare the scene with these layers"]);
+    assert_eq!(room.names(), ["scene.card"]);
 }
 
 /// Options of small frames.

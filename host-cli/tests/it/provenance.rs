@@ -24,6 +24,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--quality", "draft"], "spp", json!(8)),
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
         (&["--aov", "direct,Z"], "aov", json!("direct,Z")),
+        (&["--transparent"], "transparent", json!(true)),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
         (&["--texture-limit", "64"], "texture-limit", json!(64)),
         (&["--light-units", "watts"], "light-units", json!("watts")),
@@ -126,6 +127,8 @@ fn the_provenance_has_exactly_the_options_that_pixels_depend_on() {
         assert_ne!(plain[key], value, "{options:?}");
         keys.insert(key);
     }
+    // A picture with a background has no entry for it.
+    keys.remove("transparent");
     let found: BTreeSet<_> = plain.as_object().expect("an object").keys().map(String::as_str).collect();
     assert_eq!(found, keys);
     for options in OTHERS {

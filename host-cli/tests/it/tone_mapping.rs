@@ -51,6 +51,33 @@ fn the_png_of_a_render_equals_that_of_its_exr() {
 }
 
 #[test]
+fn a_transparent_picture_has_alpha_in_all_its_files() {
+    let room = room_with_a_scene();
+    let sky = ["--environment", "1,1,1", "--camera-at", "0,2,9"];
+    let layers = ["--aov", "object,material,alpha,position"];
+    let files = ["-o", "a.exr", "-o", "a.png", "--transparent"];
+    room.rendered("scene.gltf", &[&files[..], &sky, &layers].concat());
+    let outcome = tonemap(&room, &["a.exr", "-o", "b.png"]);
+    assert_eq!((outcome.status, outcome.stderr), (Some(0), String::new()));
+    assert!(room.read("a.png") == room.read("b.png"));
+    let is_rgba = |name| room.read(name)[25] == 6;
+    assert!(is_rgba("a.png"));
+    let picture = read(&room.path("a.exr"), Shown::Rendered).unwrap();
+    let alpha = picture.alpha.expect("the picture has alpha");
+    assert!(alpha.contains(&0.0) && alpha.iter().any(|&alpha| alpha > 0.0));
+    let background = alpha.iter().zip(&picture.pixels).filter(|(alpha, _)| **alpha == 0.0);
+    assert!(background.into_iter().all(|(_, pixel)| *pixel == [0.0; 3]));
+    // Layers alone do not make a picture transparent.
+    room.rendered("scene.gltf", &[&["-o", "c.exr", "-o", "c.png"][..], &sky, &layers].concat());
+    let opaque = read(&room.path("c.exr"), Shown::Rendered).unwrap();
+    assert!(opaque.alpha.is_none() && !is_rgba("c.png"));
+    assert!(opaque.pixels.iter().flatten().all(|&value| value > 0.0));
+    let outcome = room.render("scene.gltf", &["-o", "a.mp4", "--frames", "1-2", "--transparent"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("no alpha") && outcome.stderr.contains(".png"), "{}", outcome.stderr);
+}
+
+#[test]
 fn finished_tiles_of_a_png_alone_are_kept_beside_it() {
     let room = room_with_a_scene();
     room.write("a.png.partial", "notes");

@@ -151,11 +151,19 @@ pub enum Parameter {
     KeepRecords,
     /// Threshold of adaptive sampling.
     AdaptiveThreshold,
+    /// Blackness of the environment that eye rays see.
+    Transparent,
+    /// Sums of positions.
+    Position,
+    /// Sums of coverage.
+    Coverage,
+    /// Coverage by identity.
+    Identities,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 27] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -179,6 +187,10 @@ impl Parameter {
         Self::InFlight,
         Self::KeepRecords,
         Self::AdaptiveThreshold,
+        Self::Transparent,
+        Self::Position,
+        Self::Coverage,
+        Self::Identities,
     ];
 
     /// Returns the fault that reports that the card cannot render with the parameter's value.
@@ -212,6 +224,10 @@ impl Parameter {
             Self::InFlight => "tiles in flight",
             Self::KeepRecords => "keeping of irradiance records",
             Self::AdaptiveThreshold => "threshold of adaptive sampling",
+            Self::Transparent => "blackness of the environment that eye rays see",
+            Self::Position => "sums of positions",
+            Self::Coverage => "sums of coverage",
+            Self::Identities => "coverage by identity",
         }
     }
 }

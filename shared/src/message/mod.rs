@@ -20,13 +20,15 @@
 //! next one.
 
 mod fault;
+mod identity;
 mod pixel;
 mod self_test;
 
 pub use self::fault::{Fault, FaultCode, Invariant, Parameter};
+pub use self::identity::{IdentityCoverage, MAX_IDENTITIES};
 pub use self::pixel::{
-    ALBEDO_STEPS, DEPTH_STEPS, LAYERED_PIXEL_BYTES, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
-    PROBES, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE, record_bytes,
+    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES, PROBES,
+    Pixel, PixelForm, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE,
 };
 pub use self::self_test::{
     CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
@@ -227,12 +229,28 @@ pub struct FrameParameters {
     /// deviation `s`. Each later sample is the mean of `s / (threshold sqrt(L))` paths, rounded, 1 to
     /// [`MAX_PATHS`].
     pub adaptive_threshold: Option<f32>,
+    /// True if the environment is black where an eye ray leaves the scene without a hit. It still lights the
+    /// scene, and is seen in mirrors and through glass.
+    pub transparent: bool,
+    /// True if the card sends [`PixelSums::position`] with each pixel.
+    pub position: bool,
+    /// True if the card sends [`PixelSums::coverage`] with each pixel.
+    pub coverage: bool,
+    /// True if the card sends [`PixelSums::identities`] with each pixel. The card image must have
+    /// [`SectionKind::Identities`](crate::image::SectionKind::Identities).
+    pub identities: bool,
 }
 
 /// Maximum number of paths per sample in adaptive sampling.
 pub const MAX_PATHS: u32 = 16;
 
 impl FrameParameters {
+    /// Optional contents of the pixels that the card sends.
+    pub const fn form(&self) -> PixelForm {
+        let Self { layers, position, coverage, identities, .. } = *self;
+        PixelForm { layers, position, coverage, identities }
+    }
+
     /// Maximum number of paths per pixel, including probes of earlier samples.
     pub fn max_paths(&self) -> u64 {
         let (of_sample, probes) =
@@ -441,7 +459,7 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Answer to [`Command::BeginFrame`]: the card can render the frame.
     FrameAccepted,
-    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. A tile takes several replies,
+    /// Consecutive pixels of a tile in row-major order, [`PixelForm::record_bytes`] each. A tile takes several replies,
     /// in any order. Every pixel is sent once.
     Pixels {
         /// Number of the tile.

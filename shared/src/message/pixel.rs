@@ -3,6 +3,8 @@
 //! Sums are integers. The sums of different samples of a pixel, from several renders, therefore add up
 //! exactly.
 
+use super::identity::{IDENTITIES_BYTES, IdentityCoverage};
+
 /// Fixed-point scale of sums of light: one radiance unit is stored as 2^40.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
 /// Fixed-point scale of sums of albedos: an albedo of 1 is stored as 2^19.
@@ -11,6 +13,8 @@ pub const ALBEDO_STEPS: u32 = 1 << 19;
 pub const NORMAL_STEPS: u32 = 1 << 18;
 /// Fixed-point scale of sums of depths: one depth unit ([`SumScale::depth`]) is stored as 2^16.
 pub const DEPTH_STEPS: u32 = 1 << 16;
+/// Fixed-point scale of sums of coverage: a sample that is all covered is stored as 2^19.
+pub const COVERAGE_STEPS: u32 = 1 << 19;
 /// Number of probes: a pixel's first samples in a frame with adaptive sampling. Their variance determines the
 /// number of paths of each later sample.
 pub const PROBES: u32 = 4;
@@ -60,6 +64,80 @@ pub struct Pixel {
     pub depth: f32,
 }
 
+/// Optional contents of a pixel's record: those that a frame asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PixelForm {
+    /// True if the record has [`LayerSums`].
+    pub layers: bool,
+    /// True if the record has [`PixelSums::position`].
+    pub position: bool,
+    /// True if the record has [`PixelSums::coverage`].
+    pub coverage: bool,
+    /// True if the record has [`PixelSums::identities`].
+    pub identities: bool,
+}
+
+impl PixelForm {
+    /// Form without optional contents.
+    pub const PLAIN: Self = Self { layers: false, position: false, coverage: false, identities: false };
+    /// Form with layers alone.
+    pub const LAYERED: Self = Self { layers: true, ..Self::PLAIN };
+    /// Form with all contents.
+    pub const FULL: Self = Self { layers: true, position: true, coverage: true, identities: true };
+
+    /// Form with the contents of either form.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self::of_number(self.number() | other.number())
+    }
+
+    /// Number of forms.
+    const COUNT: usize = 16;
+
+    /// Form whose contents are the bits of `number`.
+    const fn of_number(number: usize) -> Self {
+        Self {
+            layers: number & 1 != 0,
+            position: number & 2 != 0,
+            coverage: number & 4 != 0,
+            identities: number & 8 != 0,
+        }
+    }
+
+    const fn number(self) -> usize {
+        let Self { layers, position, coverage, identities } = self;
+        layers as usize | (position as usize) << 1 | (coverage as usize) << 2 | (identities as usize) << 3
+    }
+
+    /// Bytes of a pixel's record.
+    pub const fn record_bytes(self) -> usize {
+        VIEW_BYTES
+            + if self.layers { LAYER_BYTES } else { LIGHT_BYTES }
+            + if self.position { POSITION_BYTES } else { 0 }
+            + if self.coverage { COVERAGE_BYTES } else { 0 }
+            + if self.identities { IDENTITIES_BYTES } else { 0 }
+    }
+
+    /// Form of the records of `bytes` bytes; `None` if there is none. Records of different forms differ in
+    /// their lengths.
+    #[inline]
+    pub const fn of_length(bytes: usize) -> Option<Self> {
+        if bytes == PIXEL_BYTES {
+            return Some(Self::PLAIN);
+        }
+        let mut number = 0;
+        while number < Self::COUNT {
+            let form = Self::of_number(number);
+            if form.record_bytes() == bytes {
+                return Some(form);
+            }
+            number += 1;
+        }
+        None
+    }
+}
+
 /// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -104,6 +182,14 @@ pub struct PixelSums {
     pub surfaces: u32,
     /// Separate sums of direct, indirect and caustic light; `None` in a frame without layers.
     pub layers: Option<LayerSums>,
+    /// Sum of the positions at which eye rays hit a surface, of the samples that [`Self::surfaces`] counts,
+    /// in steps of 1 / [`DEPTH_STEPS`] depth units; `None` in a frame without positions.
+    pub position: Option<[i64; 3]>,
+    /// Sum of the weights of the paths whose eye ray hits a surface, in steps of 1 / [`COVERAGE_STEPS`]. A
+    /// path has the weight that it has in the sum of light. `None` in a frame without coverage.
+    pub coverage: Option<u32>,
+    /// Coverage by identity; `None` in a frame without identities.
+    pub identities: Option<IdentityCoverage>,
 }
 
 /// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and the number of final
@@ -125,17 +211,26 @@ pub struct LayerSums {
 const VIEW_BYTES: usize = 12 + 12 + 8 + 4;
 /// Bytes of a sum of light.
 const LIGHT_BYTES: usize = 24;
-/// Bytes of a pixel without layers.
-pub const PIXEL_BYTES: usize = VIEW_BYTES + LIGHT_BYTES;
-/// Bytes of a pixel with layers.
-pub const LAYERED_PIXEL_BYTES: usize = VIEW_BYTES + 3 * LIGHT_BYTES + 4;
+/// Bytes of separate sums of light, and of the number of gathers.
+const LAYER_BYTES: usize = 3 * LIGHT_BYTES + 4;
+/// Bytes of a sum of positions.
+const POSITION_BYTES: usize = 24;
+/// Bytes of a sum of coverage.
+const COVERAGE_BYTES: usize = 4;
+/// Bytes of a pixel without optional contents ([`PixelForm::PLAIN`]).
+pub const PIXEL_BYTES: usize = PixelForm::PLAIN.record_bytes();
 /// Maximum length of the pixels in one [`super::Reply::Pixels`], bytes.
 pub const PIXELS_BYTES: usize = 16 * PIXEL_BYTES;
 
-/// Bytes of a pixel without or with layers.
-pub const fn record_bytes(layers: bool) -> usize {
-    if layers { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES }
-}
+const _: () = {
+    let mut number = 0;
+    while number < PixelForm::COUNT {
+        let form = PixelForm::of_number(number);
+        let found = PixelForm::of_length(form.record_bytes());
+        assert!(matches!(found, Some(found) if found.number() == number));
+        number += 1;
+    }
+};
 
 /// Reader of little-endian numbers. It returns zeros after the end.
 struct Numbers<'a>(&'a [u8]);
@@ -169,8 +264,17 @@ impl LayerSums {
 
 impl PixelSums {
     /// Sums over no samples.
-    pub const NOTHING: Self =
-        Self { light: [0; 3], albedo: [0; 3], normal: [0; 3], depth: 0, surfaces: 0, layers: None };
+    pub const NOTHING: Self = Self {
+        light: [0; 3],
+        albedo: [0; 3],
+        normal: [0; 3],
+        depth: 0,
+        surfaces: 0,
+        layers: None,
+        position: None,
+        coverage: None,
+        identities: None,
+    };
 
     /// Replaces the light, and removes the layers.
     pub fn with_light(self, light: [i64; 3]) -> Self {
@@ -182,13 +286,36 @@ impl PixelSums {
         Self { light: layers.light(), layers: Some(layers), ..self }
     }
 
-    /// Reads sums; `None` if the length of `bytes` is not one of [`record_bytes`].
+    /// Optional contents of the sums.
+    pub fn form(&self) -> PixelForm {
+        PixelForm {
+            layers: self.layers.is_some(),
+            position: self.position.is_some(),
+            coverage: self.coverage.is_some(),
+            identities: self.identities.is_some(),
+        }
+    }
+
+    /// Returns the sums with the optional contents of `form`: others are removed, and missing ones are 0.
+    #[must_use]
+    pub fn in_form(self, form: PixelForm) -> Self {
+        let light = match form.layers {
+            true => self.with_layers(self.layers.unwrap_or_default()),
+            false => self.with_light(self.light),
+        };
+        Self {
+            position: form.position.then(|| self.position.unwrap_or_default()),
+            coverage: form.coverage.then(|| self.coverage.unwrap_or_default()),
+            identities: form.identities.then(|| self.identities.unwrap_or_default()),
+            ..light
+        }
+    }
+
+    /// Reads sums; `None` if the length of `bytes` is that of no [`PixelForm`], or the identities are not in
+    /// the order of [`IdentityCoverage`].
     #[inline]
     pub fn read(bytes: &[u8]) -> Option<Self> {
-        let has_layers = bytes.len() == LAYERED_PIXEL_BYTES;
-        if bytes.len() != record_bytes(has_layers) {
-            return None;
-        }
+        let form = PixelForm::of_length(bytes.len())?;
         let mut numbers = Numbers(bytes);
         let view = Self {
             albedo: numbers.vector(u32::from_le_bytes),
@@ -198,18 +325,28 @@ impl PixelSums {
             ..Self::default()
         };
         let mut light = || numbers.vector(i64::from_le_bytes);
-        Some(if has_layers {
+        let lit = if form.layers {
             let [direct, indirect, caustic] = [light(), light(), light()];
             let gathers = u32::from_le_bytes(numbers.next());
             view.with_layers(LayerSums { direct, indirect, caustic, gathers })
         } else {
             view.with_light(light())
-        })
+        };
+        if form == PixelForm::PLAIN || form == PixelForm::LAYERED {
+            return Some(lit);
+        }
+        let position = form.position.then(|| numbers.vector(i64::from_le_bytes));
+        let coverage = form.coverage.then(|| u32::from_le_bytes(numbers.next()));
+        let identities = match form.identities {
+            true => Some(IdentityCoverage::of_numbers(|| u32::from_le_bytes(numbers.next()))?),
+            false => None,
+        };
+        Some(Self { position, coverage, identities, ..lit })
     }
 
-    /// Passes the encoded sums to `append`, [`record_bytes`] bytes in total.
+    /// Passes the encoded sums to `append`, [`PixelForm::record_bytes`] bytes in total.
     pub fn write(&self, append: &mut impl FnMut(&[u8])) {
-        let Self { light, albedo, normal, depth, surfaces, layers } = self;
+        let Self { light, albedo, normal, depth, surfaces, layers, position, coverage, identities } = self;
         append(albedo.map(u32::to_le_bytes).as_flattened());
         append(normal.map(i32::to_le_bytes).as_flattened());
         append(&depth.to_le_bytes());
@@ -222,9 +359,19 @@ impl PixelSums {
                 append(&gathers.to_le_bytes());
             }
         }
+        if let Some(position) = position {
+            append(position.map(i64::to_le_bytes).as_flattened());
+        }
+        if let Some(coverage) = coverage {
+            append(&coverage.to_le_bytes());
+        }
+        if let Some(identities) = identities {
+            identities.numbers(|number| append(&number.to_le_bytes()));
+        }
     }
 
-    /// Returns the sums over the samples of both operands. Layers are dropped unless both operands have them.
+    /// Returns the sums over the samples of both operands. Optional contents are dropped unless both operands
+    /// have them.
     #[must_use]
     pub fn plus(&self, more: &Self) -> Self {
         let view = Self {
@@ -232,6 +379,12 @@ impl PixelSums {
             normal: added(self.normal, more.normal, i32::saturating_add),
             depth: self.depth.saturating_add(more.depth),
             surfaces: self.surfaces.saturating_add(more.surfaces),
+            position: self.position.zip(more.position).map(|(sum, more)| added_light(sum, more)),
+            coverage: self.coverage.zip(more.coverage).map(|(sum, more)| sum.saturating_add(more)),
+            identities: match (&self.identities, &more.identities) {
+                (Some(identities), Some(more)) => Some(identities.plus(more)),
+                _ => None,
+            },
             ..Self::default()
         };
         match (&self.layers, &more.layers) {
@@ -258,7 +411,7 @@ impl PixelSums {
             normal: normal.map(|value| rounded(of_all(value, NORMAL_STEPS)) as i32),
             depth: if sees { rounded(depth) } else { 0 },
             surfaces: if sees { samples } else { 0 },
-            layers: None,
+            ..Self::NOTHING
         }
     }
 
@@ -283,6 +436,27 @@ impl PixelSums {
             albedo: self.albedo.map(|sum| (f64::from(sum) * albedo) as f32),
             normal: self.normal.map(|sum| (f64::from(sum) * normal) as f32),
             depth: if self.surfaces > 0 { (self.depth as f64 * depth) as f32 } else { f32::INFINITY },
+        }
+    }
+
+    /// Returns the mean position of the surfaces that the samples see, metres from the scene's origin; `None`
+    /// in a frame without positions, or if no surface is seen.
+    pub fn mean_position(&self, scale: &SumScale) -> Option<[f64; 3]> {
+        let unit = f64::from(scale.depth) / f64::from(DEPTH_STEPS);
+        let sum = self.position.filter(|_| self.surfaces > 0)?;
+        Some(sum.map(|sum| sum as f64 / f64::from(self.surfaces) * unit))
+    }
+
+    /// Returns the fraction of the pixel that surfaces cover, 0 to 1. In a frame without
+    /// [`Self::coverage`], it is the share of the samples that see a surface.
+    pub fn alpha(&self, count: SampleCount) -> f32 {
+        match self.coverage {
+            Some(coverage) => {
+                let share = f64::from(coverage) / f64::from(COVERAGE_STEPS) / count.weight_of_light();
+                // Weights such as 1/3 are rounded to steps.
+                if share > 1.0 { 1.0 } else { share as f32 }
+            }
+            None => (f64::from(self.surfaces) / f64::from(count.samples.max(1))) as f32,
         }
     }
 

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use photoncard_driver::cryptomatte::Identities;
 use photoncard_driver::film::{Film, SumFormat, Window};
 use photoncard_driver::layer::Layers;
 use photoncard_driver::parts::{self, Part, PartError, PartHead, Parts};
@@ -39,14 +40,20 @@ impl Files {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let settings = settings();
         let window = Window::full(settings.picture.width, settings.picture.height);
-        let mut film = Film::new(window.x1, window.y1, window, SumFormat::ONE).expect("a film");
+        let layers: Layers = "albedo,position,object".parse().expect("layers");
+        let format = SumFormat { form: layers.form(), ..SumFormat::ONE };
+        let mut film = Film::new(window.x1, window.y1, window, format).expect("a film");
+        film.set_origin([1.0, 2.0, 3.0]);
+        let names = ["wall", "lamp"].map(str::to_owned);
+        let identities = Identities::new(names.to_vec(), names.to_vec(), vec![[0, 0], [1, 1]]);
         for (x, y) in (0..window.y1).flat_map(|y| (0..window.x1).map(move |x| (x, y))) {
             film.write(x, y, &Default::default()).expect("a pixel of the film");
         }
         let written = |(number, count): (u32, u32)| {
             let part = Part::new(number, count).expect("a part");
             let command = vec!["render".to_owned()];
-            let head = PartHead::new(part, &film, settings.of_pixels(), &Layers::default(), command);
+            let head =
+                PartHead::new(part, &film, settings.of_pixels(), &layers, identities.as_ref(), command);
             let path = folder.path().join("part");
             parts::write(&path, &head, &film).expect("there is room for a part");
             fs::read(path).expect("a part")

@@ -44,6 +44,10 @@ pub(super) fn frame() -> FrameParameters {
         in_flight: 3,
         keep_records: true,
         adaptive_threshold: Some(0.5),
+        transparent: false,
+        position: false,
+        coverage: false,
+        identities: false,
     }
 }
 

@@ -16,7 +16,7 @@ use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::image::{Header, LAYOUT_VERSION};
 use photoncard_shared::layout::PhotonGrid;
 use photoncard_shared::message::{
-    self, FrameParameters, PIXELS_BYTES, PROTOCOL_VERSION, Reply, Tile, record_bytes,
+    self, FrameParameters, PIXELS_BYTES, PROTOCOL_VERSION, PixelForm, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 
@@ -36,14 +36,17 @@ const MAX_FRAMES: usize = 64;
 const MAX_STEPS: usize = 400;
 
 /// First byte of a record in which the card is reset. With any other first byte except [`WAIT`], the card
-/// sends the reply in the record. An input has one more byte before its records, which states whether the
-/// frame has layers.
+/// sends the reply in the record. An input has one more byte before its records, which states whether pixels
+/// have all optional contents.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 
+/// Forms of pixels of the sessions.
+const FORMS: [PixelForm; 2] = [PixelForm::PLAIN, PixelForm::FULL];
+
 /// Target for sessions.
 pub(super) struct Sessions {
-    /// Replies of a valid session in order: without layers, and with them.
+    /// Replies of a valid session in order: without optional contents of pixels, and with all.
     replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
     upload: Arc<Upload>,
@@ -51,9 +54,10 @@ pub(super) struct Sessions {
 }
 
 /// Replies of a valid session, in order.
-fn sound_replies(hello: Reply, layers: bool) -> Vec<Vec<u8>> {
-    let tile_pixels = vec![0; (SIDE * SIDE) as usize * record_bytes(layers)];
-    let pixels_of_reply = PIXELS_BYTES / record_bytes(layers);
+fn sound_replies(hello: Reply, form: PixelForm) -> Vec<Vec<u8>> {
+    let record = form.record_bytes();
+    let tile_pixels = vec![0; (SIDE * SIDE) as usize * record];
+    let pixels_of_reply = PIXELS_BYTES / record;
     let mut replies = vec![
         hello,
         Reply::Checksums { first: 0, data: &[7; 24] },
@@ -61,7 +65,7 @@ fn sound_replies(hello: Reply, layers: bool) -> Vec<Vec<u8>> {
         Reply::FrameAccepted,
     ];
     for tile in 0..2 {
-        let parts = tile_pixels.chunks(pixels_of_reply * record_bytes(layers));
+        let parts = tile_pixels.chunks(pixels_of_reply * record);
         let firsts = (0..).step_by(pixels_of_reply);
         replies.extend(firsts.zip(parts).map(|(first, data)| Reply::Pixels { tile, first, data }));
         replies.push(Reply::TileDone { tile, counters: Counters::ZERO });
@@ -89,10 +93,16 @@ impl Sessions {
             board: None,
         };
         Self {
-            replies: [false, true].map(|layers| sound_replies(hello(LINES), layers)),
+            replies: FORMS.map(|form| sound_replies(hello(LINES), form)),
             others: [messages::replies(), vec![encoded(&hello(0)), encoded(&hello(u32::MAX))]].concat(),
             upload: Arc::new(Upload::new(Arc::new(vec![Line::ZERO; LINES as usize]))),
-            frames: [false, true].map(|layers| FrameParameters { layers, ..messages::frame() }),
+            frames: FORMS.map(|PixelForm { layers, position, coverage, identities }| FrameParameters {
+                layers,
+                position,
+                coverage,
+                identities,
+                ..messages::frame()
+            }),
         }
     }
 
@@ -202,8 +212,8 @@ impl Target for Sessions {
 
     fn read(&self, mut input: &[u8]) -> bool {
         let tiles = [0, 1].map(|id| Tile { id, x: SIDE * id, y: 0, width: SIDE, height: SIDE });
-        let layers = input.split_off_first().is_some_and(|first| first & 1 != 0);
-        let format = SumFormat { layers, ..SumFormat::ONE };
+        let has_all = input.split_off_first().is_some_and(|first| first & 1 != 0);
+        let format = SumFormat { form: FORMS[usize::from(has_all)], ..SumFormat::ONE };
         let film = Film::new(2 * SIDE, SIDE, Window::full(2 * SIDE, SIDE), format).expect("a small film");
         let film = Mutex::new(film);
         let mut ends = Ends {
@@ -212,7 +222,7 @@ impl Target for Sessions {
             dispatcher: Dispatcher::new(Scheduler::new(tiles.to_vec(), 1), vec![&film]),
             now: Duration::ZERO,
         };
-        let frame = &self.frames[usize::from(layers)];
+        let frame = &self.frames[usize::from(has_all)];
         let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
         let limits = PixelLimits::new(&Header { reach: 1.0, photon_grid, ..Header::EMPTY }, frame);
         let job = Job { upload: self.upload.clone(), frame: *frame, limits };

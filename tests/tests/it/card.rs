@@ -168,6 +168,7 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
             FrameParameters { max_distance: f32::NAN, ..frame() },
             // The card image has photons, but no irradiance points.
             FrameParameters { radiance: Radiance::Precomputed, ..frame() },
+            FrameParameters { identities: true, ..frame() },
         ];
         for bad in bad_frames {
             assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");

@@ -128,6 +128,8 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
                 s.integrator.sampling = sampling;
                 s.integrator.irradiance_error = irradiance_error;
                 s.integrator.samples = samples;
+                s.picture.layers = settings_of.picture.layers.clone();
+                s.picture.transparent = settings_of.picture.transparent;
             })
         };
         let expected = sums(&render_or_panic(scene, &with(settings())).film);
@@ -156,6 +158,9 @@ fn projected(camera: &Camera, number: usize) -> Camera {
 fn layer_sums(film: &Film) -> Vec<LayerSums> {
     film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
 }
+
+/// Layers that chips sum on request without more memory.
+const COVERAGE: &str = "alpha,position,object,material";
 
 /// Gather orders that chips have.
 const CHIPS_ORDERS: [GatherOrder; 6] = {
@@ -206,6 +211,7 @@ proptest! {
         has_layers: bool,
         is_adaptive: bool,
         projection in 0_usize..4,
+        transparent: bool,
     ) {
         let scene = everything().with(|scene| scene.cameras[0] = projected(&scene.cameras[0], projection));
         let base = settings().with(|s| {
@@ -218,6 +224,7 @@ proptest! {
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.5));
             }
             s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
+            s.picture.transparent = transparent;
             s.schedule.tile = Some(8);
         });
         let expected = render_or_panic(&scene, &base).film;
@@ -263,6 +270,8 @@ fn textures_cut_outs_mirrors_glass_and_lights_of_every_kind_are_exact() {
     let small = few_pixels().with(|s| {
         (s.picture.width, s.picture.height) = (21, 17);
         s.photons.caustic_photons = Some(1000);
+        s.picture.layers = COVERAGE.parse().unwrap();
+        s.picture.transparent = true;
     });
     check_variants_of(&everything(), &small);
 }
@@ -288,6 +297,7 @@ fn adaptive_sampling_is_exact() {
                 s.integrator.gather_rays = if irradiance_error.is_some() { 128 } else { 24 };
                 s.integrator.irradiance_error = irradiance_error;
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.03));
+                s.picture.layers = COVERAGE.parse().unwrap();
             })
         };
         let adaptive = render_or_panic(&scene, &with(settings()));
@@ -363,7 +373,7 @@ fn samples_rounded_to_the_next_pixel_are_exact() {
 #[test]
 fn gathers_along_one_curve_through_a_frame_bring_the_light_of_any_order() {
     let scene = everything();
-    let packed = || PackedScene::new(&scene).unwrap();
+    let packed = || PackedScene::with_identities(&scene).unwrap();
     let mapped = map_photons(packed(), &settings().photon_settings(&scene), &|_| true).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let caches = "photon=16K/128/4,scene=16K/128/4".parse().unwrap();

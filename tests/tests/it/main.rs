@@ -7,6 +7,7 @@ mod caches;
 mod cameras;
 mod card;
 mod caustics;
+mod coverage;
 mod density;
 mod emission;
 mod energy;

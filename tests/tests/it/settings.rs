@@ -85,6 +85,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             focus: Pixels = Some(0.7),
             layers: Pixels = Layers::all(),
             filter: Pixels = Filter::Gaussian,
+            transparent: Pixels = true,
         }
         photons: PhotonMaps {
             count: Image = 2001,
@@ -147,10 +148,11 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
     changes
 }
 
-/// Scene with every feature, seen by two cameras.
+/// Scene with every feature, and half of the wall before the camera open to the sky, seen by two cameras.
 fn with_two_cameras() -> Scene {
     let mut scene = everything();
     scene.cameras[0].lens = Some(Lens { radius: 0.05, focus: 1.5 });
+    scene.triangles.remove(8);
     let mut second = scene.cameras[0].clone();
     second.name = "second".into();
     second.projection = Projection::perspective(0.9 * second.vertical_fov().unwrap());
@@ -165,8 +167,15 @@ fn bits(film: &Film) -> Vec<u32> {
     let pixels = film.all().flat_map(|film| {
         let pixel = [film.pixel.radiance, film.pixel.albedo, film.pixel.normal];
         let layers = [film.layers.direct, film.layers.indirect, film.layers.caustic];
-        let single = [film.pixel.depth, film.layers.gathers];
-        pixel.into_iter().chain(layers).flatten().chain(single).map(f32::to_bits).collect::<Vec<_>>()
+        let single = [film.pixel.depth, film.layers.gathers, film.alpha];
+        pixel
+            .into_iter()
+            .chain(layers)
+            .chain([film.position])
+            .flatten()
+            .chain(single)
+            .map(f32::to_bits)
+            .collect::<Vec<_>>()
     });
     size.into_iter().chain(pixels).collect()
 }

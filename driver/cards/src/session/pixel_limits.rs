@@ -3,7 +3,7 @@
 use photoncard_picture::sums::SumFormat;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{
-    ALBEDO_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
+    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
 };
 
 /// Relative rounding error of a unit normal.
@@ -21,16 +21,23 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// | normals | length 0 to s (1 + 2^-19) |
 /// | depths | 0 to s times the distance from the eye to the farthest corner of `[-reach, reach]^3` |
 /// | surfaces s, gathers | 0 to n |
+/// | positions | -s to s times `reach`, on each axis |
+/// | coverage | 0 to the weight of all paths |
+/// | coverage of all identities together | 0 to the coverage |
 ///
 /// The maximum magnitude of a coordinate of the scene is `reach` (`Header::reach`), metres. The tolerance of
-/// depths is s times the sum of one step and `2^-19 (reach + e)`, where `e` is the maximum magnitude of a
-/// coordinate of the eye.
+/// depths and positions is s times the sum of one step and `2^-19 (reach + e)`, where `e` is the maximum
+/// magnitude of a coordinate of the eye. That of coverage is half a step for each path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
     /// Minimum and maximum depth of a sample, in steps of 1 / [`DEPTH_STEPS`] depth units; `None` if no value
     /// is checked.
     depths: Option<[f64; 2]>,
+    /// Maximum magnitude of a coordinate of a position, in steps of 1 / [`DEPTH_STEPS`] depth units.
+    reach: f64,
+    /// Maximum sum of coverage.
+    coverage: f64,
 }
 
 /// Invalid value of a channel.
@@ -47,13 +54,19 @@ impl PixelLimits {
         let format = SumFormat::new(header, frame);
         let steps = f64::from(DEPTH_STEPS) / f64::from(format.scale.depth);
         let rounding = f64::from(DEPTH_ROUNDING * (header.reach + eye)) * steps + 1.0;
-        Self { format, depths: Some([-rounding, farthest_corner(header, frame) * steps + rounding]) }
+        let tolerance = 0.5 * frame.max_paths() as f64;
+        Self {
+            format,
+            depths: Some([-rounding, farthest_corner(header, frame) * steps + rounding]),
+            reach: f64::from(header.reach) * steps + rounding,
+            coverage: format.count().weight_of_light() * f64::from(COVERAGE_STEPS) + tolerance,
+        }
     }
 
     /// Creates limits that any value meets, for a relay, whose host checks the values. The units of the
     /// format are those of an empty scene.
     pub fn unchecked(frame: &FrameParameters) -> Self {
-        Self { format: SumFormat::new(&Header::EMPTY, frame), depths: None }
+        Self { format: SumFormat::new(&Header::EMPTY, frame), depths: None, reach: 0.0, coverage: 0.0 }
     }
 
     /// Format of the sums.
@@ -64,7 +77,8 @@ impl PixelLimits {
     /// Returns the first invalid value of a pixel; `None` if all are valid.
     pub(super) fn find_bad(&self, sums: &PixelSums) -> Option<BadValue> {
         let depths = self.depths?;
-        let PixelSums { light, albedo, normal, depth, surfaces, layers } = *sums;
+        let PixelSums { light, albedo, normal, depth, surfaces, layers, position, coverage, identities } =
+            *sums;
         let seen = f64::from(surfaces);
         let find = |channel, values: [f64; 3], is_possible: &dyn Fn(f64) -> bool| {
             let bad = values.into_iter().find(|&value| !is_possible(value));
@@ -86,6 +100,22 @@ impl PixelLimits {
             .or_else(|| find("albedo", albedo.map(f64::from), &is_albedo))
             .or_else(|| find("a normal of component", normal, &|_| length <= seen * (1.0 + NORMAL_ROUNDING)))
             .or_else(|| (!is_deep).then_some(BadValue { channel: "depth", value: depth as f64 }))
+            .or_else(|| {
+                let most = self.reach * seen;
+                let is_near = |value: f64| value.abs() <= most;
+                find("a position of coordinate", position?.map(|value| value as f64), &is_near)
+            })
+            .or_else(|| {
+                let covered = coverage?;
+                let is_possible = f64::from(covered) <= self.coverage && (covered > 0 || surfaces == 0);
+                (!is_possible).then_some(BadValue { channel: "coverage", value: f64::from(covered) })
+            })
+            .or_else(|| {
+                let total = identities?.total();
+                let is_possible = coverage.is_none_or(|covered| total <= covered);
+                let bad = BadValue { channel: "coverage of identities", value: f64::from(total) };
+                (!is_possible).then_some(bad)
+            })
             .or_else(|| {
                 let LayerSums { direct, indirect, caustic, gathers } = layers?;
                 find_light("direct light", direct)

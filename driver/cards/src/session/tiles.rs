@@ -65,7 +65,8 @@ impl TilesInFlight {
             return Err(SessionError::Unexpected("pixels that it has sent before"));
         }
         for (index, pixel) in (first..).zip(pixels) {
-            let sums = PixelSums::read(pixel).unwrap_or_default();
+            let wrong_order = SessionError::Unexpected("pixels whose identities are not in order");
+            let sums = PixelSums::read(pixel).ok_or(wrong_order)?;
             if let Some(BadValue { channel, value }) = limits.find_bad(&sums) {
                 let (x, y) = (tile.x + index % tile.width, tile.y + index / tile.width);
                 return Err(SessionError::Value { tile, x, y, channel, value });
@@ -156,6 +157,10 @@ mod tests {
             in_flight: 2,
             keep_records: false,
             adaptive_threshold: None,
+            transparent: false,
+            position: false,
+            coverage: false,
+            identities: false,
         }
     }
 

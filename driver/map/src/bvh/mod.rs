@@ -24,6 +24,8 @@ pub struct Hierarchy {
     /// For each leaf, the indices of its triangles, by slot. They count the triangles in world space, then
     /// those of each group in turn ([`Content`]). Empty for an instance.
     pub leaf_triangles: Vec<LeafTriangles>,
+    /// Leaves that hold an instance, each with the instance's index.
+    pub instances: Vec<(usize, u32)>,
 }
 
 /// Indices of a leaf's triangles, by slot.
@@ -216,10 +218,13 @@ fn joined(
     around_instances: &[Aabb],
     finishes: Finishes,
 ) -> Result<Hierarchy, HierarchyError> {
-    let mut hierarchy = Hierarchy { nodes: Vec::new(), leaves: Vec::new(), leaf_triangles: Vec::new() };
+    let mut hierarchy = Hierarchy {
+        nodes: Vec::new(),
+        leaves: Vec::new(),
+        leaf_triangles: Vec::new(),
+        instances: Vec::new(),
+    };
     let (mut roots, mut first_triangle) = (Vec::new(), 0);
-    // Leaves that hold an instance, each with its index.
-    let mut instances: Vec<(usize, u32)> = Vec::new();
     let meshes = std::iter::once(content.triangles).chain(content.groups.iter().map(Vec::as_slice));
     for (FoldedTree { folded: Folded { nodes, leaves, .. }, binary }, triangles) in
         folded.into_iter().zip(meshes)
@@ -253,14 +258,14 @@ fn joined(
         };
         if roots.len() == 1 {
             let instance = |indices: &LeafTriangles| indices.first()?.checked_sub(triangles.len() as u32);
-            instances
-                .extend((0..).zip(&leaves).filter_map(|(leaf, indices)| Some((leaf, instance(indices)?))));
+            let found = (0..).zip(&leaves).filter_map(|(leaf, indices)| Some((leaf, instance(indices)?)));
+            hierarchy.instances.extend(found);
         }
         hierarchy.leaf_triangles.extend(leaves.into_iter().map(of_stored));
         first_triangle += triangles.len() as u32;
     }
-    for (leaf, instance) in instances {
-        let Instance { group, to_world, to_group } = content.instances[instance as usize];
+    for &(leaf, instance) in &hierarchy.instances {
+        let Instance { group, to_world, to_group, .. } = content.instances[instance as usize];
         let root = roots[1 + group as usize];
         let Aabb { min, max } = around_instances[instance as usize];
         let reach = min.abs().max(max.abs()).max_element();

@@ -4,10 +4,13 @@
 //! ([`crate::photon`]) traces in it with the chip's ray caster, so that photons lie on exactly the surfaces
 //! that gather rays hit. [`crate::photon_map`] adds the sections of the photon map.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_picture::allocation::{self, OutOfMemory};
+use photoncard_picture::cryptomatte::Identities;
 use photoncard_scene::Scene;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{
@@ -23,6 +26,7 @@ mod card_image;
 mod corners;
 mod error;
 mod flat_glass;
+mod identities;
 mod materials;
 mod textures;
 mod writer;
@@ -31,6 +35,7 @@ pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 pub use self::error::PackError;
 use self::flat_glass::Glazing;
+use self::identities::Identified;
 pub(crate) use self::writer::ImageWriter;
 pub use crate::light::SourceRadiance;
 
@@ -41,6 +46,8 @@ const BYTES_OF_A_TRIANGLE: u64 = 400;
 #[derive(Clone)]
 pub struct PackedScene {
     image: CardImage,
+    /// Names of the image's identities; `None` for an image without identities.
+    identities: Option<Arc<Identities>>,
     /// Part of the scene in which photons are stored; `None` if it is the whole scene.
     detailed_part: Option<[Vec3; 2]>,
     sources: Sources,
@@ -57,6 +64,19 @@ impl PackedScene {
     /// If the geometry exceeds a chip's limits or this process's memory, or there are more textures or lights
     /// than a chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
+        Self::of_content(scene, false)
+    }
+
+    /// Packs the scene as [`Self::new`] does, with the identities of its triangles: numbers of pairs of object
+    /// and material.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_identities(scene: &Scene) -> Result<Self, PackError> {
+        Self::of_content(scene, true)
+    }
+
+    fn of_content(scene: &Scene, has_identities: bool) -> Result<Self, PackError> {
         let groups = scene.expanded_groups();
         let expands = groups.contains(&true);
         let triangles = scene.stored_if_expanded(&groups);
@@ -69,10 +89,12 @@ impl PackedScene {
         let split = part.map(|part| detail::split_around(scene, part));
         let scene = split.as_ref().unwrap_or(scene);
         let lights = Lights::new(scene);
-        let image = write(scene, &lights)?;
+        let identified = has_identities.then(|| Identified::new(scene));
+        let image = write(scene, &lights, identified.as_ref())?;
         let keeps_photons = materials::keep_photons(scene, image.view());
         Ok(Self {
             image,
+            identities: identified.map(|identified| Arc::new(identified.names)),
             detailed_part: part,
             sources: Sources::new(scene, &lights, part),
             aimed_sources: Sources::aimed(scene, &lights, part),
@@ -86,6 +108,11 @@ impl PackedScene {
     /// Returns the scene, without photons, as a chip reads it: header and lines.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         self.image.view()
+    }
+
+    /// Names of the image's identities; `None` for an image without identities.
+    pub fn identities(&self) -> Option<Arc<Identities>> {
+        self.identities.clone()
     }
 
     /// Card image without photons.
@@ -154,8 +181,8 @@ impl PackedScene {
     }
 }
 
-/// Writes a card image with the sections of a scene.
-fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
+/// Writes a card image with the sections of a scene, and with identities if they are given.
+fn write(scene: &Scene, lights: &Lights, identified: Option<&Identified>) -> Result<CardImage, PackError> {
     let uncovered = scene.uncovered_materials();
     let glazing = Glazing::new(scene);
     let flat_glass = glazing.is_flat(scene);
@@ -166,6 +193,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
     let textures = textures::records(scene, lights.environment())?;
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
+    let identities = identified.map_or(Vec::new(), |identified| identified.values(scene, &hierarchy));
     let texel_lines = textures::lines(scene, lights.environment());
     let attribute_lines = corners.records.len().div_ceil(layout::Attributes::PER_LINE);
     // The other sections fit in the lines that are allocated for photons.
@@ -186,6 +214,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
     let cells = lights.cell_thresholds();
     image.append(SectionKind::EnvironmentCells, cells.iter().map(|threshold| threshold.to_le_bytes()))?;
+    image.append(SectionKind::Identities, identities.iter().map(|value| value.to_le_bytes()))?;
     Ok(image.finish())
 }
 

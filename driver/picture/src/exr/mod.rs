@@ -2,11 +2,13 @@
 //!
 //! A file has one part. Radiance is in the unnamed layer, in the channels `R G B`, which every viewer shows.
 //! Layers are in channels such as `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The
-//! data window is the film's crop window, the display window the full picture. The picture's provenance is
-//! JSON in the attribute `photoncard`. It is a single attribute, because the `exr` crate keeps attributes in
-//! a hash map: several would change the file's bytes from run to run. The standard attribute `comments`
-//! contains the file's checksum, by which [`is_intact`] recognises a truncated or damaged file.
+//! data window is the film's crop window, the display window the full picture. A transparent picture has the
+//! channel `A` beside them: radiance is premultiplied. The picture's provenance is JSON in the attribute
+//! `photoncard`; mattes have attributes of their own ([`crate::cryptomatte`]). The `exr` crate keeps these
+//! attributes in a hash map; `attributes` sorts them. The standard attribute `comments` contains the file's
+//! checksum, by which [`is_intact`] recognises a truncated or damaged file.
 
+mod attributes;
 mod dwa;
 
 use std::io::{self, Cursor};
@@ -24,10 +26,11 @@ use thiserror::Error;
 
 use crate::allocation::{self, OutOfMemory};
 use crate::choice::choices;
+use crate::cryptomatte::{self, Identities, Matte};
 use crate::film::Film;
 use crate::foreign;
 use crate::intact::{self, BLANK};
-use crate::layer::{Channel, Layers};
+use crate::layer::{COLOUR_ALPHA, Channel, Layers};
 #[cfg(not(target_family = "wasm"))]
 use crate::output::{self, OutputError};
 
@@ -37,7 +40,8 @@ pub const PROVENANCE: &str = "photoncard";
 /// Maximum number of pixels of a picture that is read.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
 
-/// Pixel type of the stored samples. The layers `Z` and `gathers` are always [`SampleFormat::Float`].
+/// Pixel type of the stored samples. The layers `Z`, `gathers` and `position` and the mattes are always
+/// [`SampleFormat::Float`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SampleFormat {
     /// `HALF`, 16 bits: three decimal digits, up to 65504. Larger finite values are stored as 65504.
@@ -49,7 +53,7 @@ pub enum SampleFormat {
 
 choices!(SampleFormat { Half = "half", Float = "float" });
 
-/// Linear RGB radiance of a file's data window.
+/// Linear RGB radiance of a file's data window, premultiplied if there is alpha.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RgbImage {
     /// Columns of the data window.
@@ -60,6 +64,8 @@ pub struct RgbImage {
     pub data_window_origin: [i32; 2],
     /// The pixels, row by row from the top.
     pub pixels: Vec<[f32; 3]>,
+    /// Alpha of the pixels, the channel `A`; `None` if the file has no such channel beside the radiance.
+    pub alpha: Option<Vec<f32>>,
     /// JSON of the attribute [`PROVENANCE`]; `None` if the file has no such attribute, or it is not JSON.
     pub provenance: Option<String>,
 }
@@ -149,6 +155,17 @@ pub struct Content<'a> {
     pub layers: &'a Layers,
     /// Denoised radiance of the film's pixels, W/(sr m^2), row by row: the layer `denoised`.
     pub denoised: Option<&'a [[f32; 3]]>,
+    /// True if the file has alpha in the unnamed layer, for a picture in which eye rays see no environment.
+    pub is_transparent: bool,
+    /// Names for the mattes; `None` leaves mattes out.
+    pub identities: Option<&'a Identities>,
+}
+
+impl<'a> Content<'a> {
+    /// Contents of a picture with a background, without a denoised layer or mattes.
+    pub fn new(film: &'a Film, layers: &'a Layers) -> Self {
+        Self { film, layers, denoised: None, is_transparent: false, identities: None }
+    }
 }
 
 /// Channels of radiance.
@@ -192,6 +209,7 @@ pub fn bytes(
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
     let mut bytes = bytes.into_inner();
+    attributes::sort(&mut bytes, |name| name == PROVENANCE || name.starts_with(cryptomatte::PREFIX));
     intact::seal_exr(&mut bytes);
     Ok(bytes)
 }
@@ -207,6 +225,12 @@ fn image_of(
     let mut attributes =
         ImageAttributes::new(IntegerBounds::from_dimensions((film.width() as usize, film.height() as usize)));
     attributes.other.insert(Text::new_or_none(PROVENANCE)?, AttributeValue::Text(provenance));
+    for (matte, identities) in mattes(content) {
+        for (name, value) in matte.attributes(identities) {
+            let value = AttributeValue::Text(Text::new_or_none(ascii(&value))?);
+            attributes.other.insert(Text::new_or_none(name)?, value);
+        }
+    }
     let size = Vec2(window.width() as usize, window.height() as usize);
     let position = Vec2(i32::try_from(window.x0).ok()?, i32::try_from(window.y0).ok()?);
     let comments = Text::new_or_none(BLANK);
@@ -220,20 +244,35 @@ fn image_of(
 }
 
 fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples> {
-    let Content { film, layers, denoised } = content;
+    let Content { film, layers, denoised, is_transparent, identities: _ } = content;
     let stored = |channel: &Channel, format: SampleFormat| {
         any_channel(channel.name, film.all().map(|pixel| (channel.value)(&pixel)), format)
     };
     let mut list: SmallVec<_> = Layers::colour().iter().map(|channel| stored(channel, format)).collect();
+    list.extend(is_transparent.then(|| stored(&COLOUR_ALPHA, format)));
     for layer in layers.iter() {
         let format = if layer.is_always_single() { SampleFormat::Float } else { format };
         list.extend(layer.channels().iter().map(|channel| stored(channel, format)));
+    }
+    for (matte, identities) in mattes(content) {
+        let values = matte.values(film, identities).into_iter();
+        list.extend(matte.channels().zip(values).map(|(name, values)| single(&name, values)));
     }
     if let Some(radiance) = denoised {
         let of_channel = |(index, name)| any_channel(name, radiance.iter().map(|pixel| pixel[index]), format);
         list.extend(DENOISED.into_iter().enumerate().map(of_channel));
     }
     AnyChannels::sort(list)
+}
+
+/// Mattes of a picture with names.
+fn mattes<'a>(content: &Content<'a>) -> impl Iterator<Item = (Matte, &'a Identities)> {
+    let identities = content.identities;
+    Matte::of(content.layers).filter_map(move |matte| Some((matte, identities?)))
+}
+
+fn single(name: &str, values: Vec<f32>) -> AnyChannel<FlatSamples> {
+    AnyChannel::new(name, FlatSamples::F32(values))
 }
 
 fn any_channel(
@@ -365,10 +404,18 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<R
         .required(red)
         .required(green)
         .required(blue)
+        .optional("A", 1.0_f32)
         .collect_pixels(
-            |size, _| (size.width(), vec![[0.0; 3]; size.area()]),
-            |(width, pixels): &mut (usize, Vec<[f32; 3]>), position, (red, green, blue): (f32, f32, f32)| {
-                pixels[position.y() * *width + position.x()] = [red, green, blue];
+            |size, (.., alpha)| {
+                let alpha = alpha.as_ref().map(|_| vec![1.0; size.area()]);
+                ReadPixels { width: size.width(), colours: vec![[0.0; 3]; size.area()], alpha }
+            },
+            |read: &mut ReadPixels, position, (red, green, blue, alpha): (f32, f32, f32, f32)| {
+                let index = position.y() * read.width + position.x();
+                read.colours[index] = [red, green, blue];
+                if let Some(all) = &mut read.alpha {
+                    all[index] = alpha;
+                }
             },
         )
         .first_valid_layer()
@@ -380,8 +427,15 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<R
     let layer = image.layer_data;
     let provenance = provenance(&layer.attributes);
     let Vec2(x, y) = layer.attributes.layer_position;
-    let (width, pixels) = layer.channel_data.pixels;
-    Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels, provenance })
+    let ReadPixels { width, colours: pixels, alpha } = layer.channel_data.pixels;
+    Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels, alpha, provenance })
+}
+
+/// Pixels of a part of a file while they are read, row by row.
+struct ReadPixels {
+    width: usize,
+    colours: Vec<[f32; 3]>,
+    alpha: Option<Vec<f32>>,
 }
 
 /// Value of the attribute [`PROVENANCE`], if it is JSON.
@@ -424,7 +478,7 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     let block = stated.min(header.max_block_byte_size() as u64);
     let transform = if dwa::is_dwa(header.compression) { dwa::transform_bytes(header) } else { 0 };
     let unpacked = transform.saturating_add(3 * block);
-    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(unpacked))
+    allocation::check(pixels.saturating_mul(size_of::<[f32; 4]>() as u64).saturating_add(unpacked))
         .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
     let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
     let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);

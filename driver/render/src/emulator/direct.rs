@@ -80,8 +80,8 @@ impl RenderedTile {
 
     /// Values of the pixels, row by row. `format` is the format of the frame's sums.
     pub fn pixels(&self, format: SumFormat) -> impl Iterator<Item = FilmPixel> {
-        let sums = self.sums.chunks(sums_of_pixel(format.layers) as usize);
-        self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light)))
+        let sums = self.sums.chunks(sums_of_pixel(format.form.layers) as usize);
+        self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light), [0.0; 3]))
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 use photoncard_picture::film::{SumFormat, Window};
 use photoncard_picture::sink::pixel_positions;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{LayerSums, PIXEL_BYTES, PixelSums, Tile};
+use photoncard_shared::message::{LayerSums, PIXEL_BYTES, PixelForm, PixelSums, Tile};
 use serde_json::json;
 
 use super::file::{FAMILY, check_lock, is_at};
@@ -175,8 +175,9 @@ fn the_later_record_of_a_tile_is_used() {
 fn layers_survive_a_partial_render() {
     let folder = tempfile::tempdir().unwrap();
     let settings = partial(&folder, true);
-    let with_layers =
-        || Film::new(4, 3, Window::full(4, 3), SumFormat { layers: true, ..SumFormat::ONE }).unwrap();
+    let with_layers = || {
+        Film::new(4, 3, Window::full(4, 3), SumFormat { form: PixelForm::LAYERED, ..SumFormat::ONE }).unwrap()
+    };
     let mut film = with_layers();
     for (number, (x, y)) in pixel_positions(&tile(0)).enumerate() {
         let view = PixelSums { depth: number as i64, ..PixelSums::default() };

@@ -1,6 +1,7 @@
 //! Head of a part's file: everything about the part and its picture except pixels.
 
-use photoncard_picture::film::{Film, FilmError, SumFormat, Window};
+use photoncard_picture::cryptomatte::Identities;
+use photoncard_picture::film::{Film, FilmError, PixelForm, SumFormat, Window};
 use photoncard_picture::layer::Layers;
 use photoncard_shared::message::SumScale;
 use serde::de::Error;
@@ -24,6 +25,16 @@ pub struct PartHead {
     pub command: Vec<String>,
     /// `f32::to_bits` of the units of the sums: radiance, W/(sr m^2), and depth, metres.
     pub units: [u32; 2],
+    /// Position of the scene's origin in the coordinates of its file, metres; left out if it is 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub origin: [f64; 3],
+    /// Names for the picture's mattes; left out without mattes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identities: Option<Identities>,
+}
+
+fn is_zero(origin: &[f64; 3]) -> bool {
+    *origin == [0.0; 3]
 }
 
 impl PartHead {
@@ -33,11 +44,20 @@ impl PartHead {
         film: &Film,
         settings: Map<String, Value>,
         layers: &Layers,
+        identities: Option<&Identities>,
         command: Vec<String>,
     ) -> Self {
         let SumScale { radiance, depth } = film.format().scale;
         let units = [radiance, depth].map(f32::to_bits);
-        Self { part, settings, layers: layers.to_string(), command, units }
+        // Only positions are in the file's coordinates.
+        let origin = if film.format().form.position { film.origin() } else { [0.0; 3] };
+        let identities = identities.filter(|_| layers.have_mattes()).cloned();
+        Self { part, settings, layers: layers.to_string(), command, units, origin, identities }
+    }
+
+    /// Returns whether the picture has alpha, and its radiance is premultiplied.
+    pub(super) fn is_transparent(&self) -> bool {
+        self.settings.get("transparent") == Some(&Value::Bool(true))
     }
 
     /// Picture that the head describes; `None` if no such picture is possible.
@@ -54,11 +74,18 @@ impl PartHead {
         let is_unit = |unit: f32| unit.is_normal() && unit > 0.0;
         let is_adaptive = self.settings.get("adaptive").is_some_and(Value::is_number);
         let scale = SumScale { radiance, depth };
-        let format = SumFormat::of_range(layers.are_of_chip(), (0, samples), is_adaptive, scale);
+        let form = layers.form();
+        let form = PixelForm { coverage: form.coverage || self.is_transparent(), ..form };
+        let format = SumFormat::of_range(form, (0, samples), is_adaptive, scale);
         let window = Window { x0, x1, y0, y1 };
-        let is_possible =
-            Film::check(width, height, window).is_ok() && samples > 0 && is_unit(radiance) && is_unit(depth);
-        is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
+        let is_possible = Film::check(width, height, window).is_ok()
+            && samples > 0
+            && is_unit(radiance)
+            && is_unit(depth)
+            && self.origin.iter().all(|coordinate| coordinate.is_finite())
+            && self.identities.is_some() == layers.have_mattes();
+        let (size, origin) = ([width, height], self.origin);
+        is_possible.then_some(PartPicture { size, window, format, origin, layers })
     }
 
     /// Describes the settings in which two heads differ. `own` and `others` name the files of the two heads.
@@ -77,10 +104,15 @@ impl PartHead {
             ("number of parts", [self, other].map(|head| head.part.count().to_string())),
             ("layers", [self, other].map(|head| head.layers.clone())),
             ("units", [self, other].map(|head| format!("{:x?}", head.units))),
+            ("origin", [self, other].map(|head| format!("{:?}", head.origin))),
         ];
+        let others_names = self.identities != other.identities;
+        let of_names =
+            others_names.then(|| format!("names of objects and materials differ in {own} and {others}"));
         let of_head = of_head.into_iter().filter(|(_, [a, b])| a != b);
         of_settings
             .chain(of_head.map(|(name, [a, b])| format!("{name}: {a} in {own}, {b} in {others}")))
+            .chain(of_names)
             .collect()
     }
 }
@@ -91,6 +123,7 @@ pub(super) struct PartPicture {
     size: [u32; 2],
     pub(super) window: Window,
     pub(super) format: SumFormat,
+    origin: [f64; 3],
     pub(super) layers: Layers,
 }
 
@@ -101,7 +134,9 @@ impl PartPicture {
     /// If the film does not fit in memory.
     pub(super) fn film(&self) -> Result<Film, FilmError> {
         let [width, height] = self.size;
-        Film::new(width, height, self.window, self.format)
+        let mut film = Film::new(width, height, self.window, self.format)?;
+        film.set_origin(self.origin);
+        Ok(film)
     }
 }
 

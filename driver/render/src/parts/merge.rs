@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::Film;
 use photoncard_picture::layer::Layers;
 use photoncard_shared::message::Tile;
@@ -26,6 +27,10 @@ pub struct Merged {
     pub film: Film,
     /// Layers of the picture besides radiance.
     pub layers: Layers,
+    /// True if the picture has alpha, and its radiance is premultiplied.
+    pub is_transparent: bool,
+    /// Names for the picture's mattes; `None` without mattes.
+    pub identities: Option<Identities>,
     /// Provenance of the picture: everything that its pixels depend on.
     pub provenance: Map<String, Value>,
 }
@@ -103,7 +108,9 @@ impl Parts {
             }
             done.entry(file.head.part).or_insert(file);
         }
-        Ok(Merged { film, layers: picture.layers.clone(), provenance: head.settings.clone() })
+        let (layers, identities) = (picture.layers.clone(), head.identities.clone());
+        let provenance = head.settings.clone();
+        Ok(Merged { film, layers, is_transparent: head.is_transparent(), identities, provenance })
     }
 }
 

@@ -30,7 +30,8 @@ fn head(part: Part, samples: u32) -> PartHead {
         "size": [80, 50], "crop": [WINDOW.x0, WINDOW.x1, WINDOW.y0, WINDOW.y1], "spp": samples, "seed": 3,
     });
     let settings = settings.as_object().unwrap().clone();
-    PartHead::new(part, &film(0), settings, &Layers::default(), vec!["render".into(), "a.gltf".into()])
+    let command = vec!["render".into(), "a.gltf".into()];
+    PartHead::new(part, &film(0), settings, &Layers::default(), None, command)
 }
 
 fn part(number: u32, count: u32) -> Part {

@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use photoncard_map::pack::CardImage;
 use photoncard_map::photon_map::PhotonsFor;
+use photoncard_picture::cryptomatte::Identities;
 use photoncard_scene::{Camera, Lens, Projection, Scene};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::Checksum;
+use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::CausticGather;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -37,6 +39,10 @@ pub(super) struct Head {
     max_distance: f32,
     caustics: Option<CausticGather>,
     paths: u64,
+    /// Names of the card image's identities, and the checksum of the scene's objects; left out for an image
+    /// without identities.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    identities: Option<(Identities, String)>,
     /// Cameras of the frames of an animation, by frame number.
     frames: BTreeMap<u32, StoredView>,
     notes: Map<String, Value>,
@@ -45,7 +51,7 @@ pub(super) struct Head {
 impl Head {
     pub(super) fn new(scene: &PreparedScene) -> Self {
         let PreparedScene { scene, photons, integrator, kept, frames, notes } = scene;
-        let Prepared { image, max_distance, caustics, paths, guiding: _ } = &kept.prepared;
+        let Prepared { image, identities, max_distance, caustics, paths, guiding: _ } = &kept.prepared;
         Self {
             program: PROGRAM.to_owned(),
             lines: image.lines().len() as u32,
@@ -59,6 +65,9 @@ impl Head {
             max_distance: *max_distance,
             caustics: *caustics,
             paths: *paths,
+            identities: identities
+                .as_deref()
+                .map(|names| (names.clone(), scene.checksum_of_objects().to_owned())),
             frames: frames.iter().map(|(number, view)| (*number, StoredView::new(view))).collect(),
             notes: notes.clone(),
         }
@@ -70,8 +79,22 @@ impl Head {
     /// If a camera, a gather distance or the offset is invalid, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
         let Self {
-            cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..
+            cameras,
+            offset,
+            photons,
+            integrator,
+            max_distance,
+            caustics,
+            paths,
+            identities,
+            frames,
+            notes,
+            ..
         } = self;
+        let values = image.view().0.header.section(SectionKind::Identities).records;
+        if identities.is_some() != (values > 0) {
+            return Err("its card image has identities without names, or there are names without identities");
+        }
         let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
         let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
         if !distances.into_iter().flatten().all(is_distance) {
@@ -91,8 +114,12 @@ impl Head {
             return Err("its place is none");
         }
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
-        let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding: None };
-        let scene = Scene::of_cameras(cameras, offset.into(), self.scene, self.is_specular);
+        let (names, objects) = identities.unzip();
+        let (image, identities) = (Arc::new(image), names.map(Arc::new));
+        let prepared = Prepared { image, identities, max_distance, caustics, paths, guiding: None };
+        let [checksum, without_cameras] = self.scene;
+        let checksums = [checksum, without_cameras, objects.unwrap_or_default()];
+        let scene = Scene::of_cameras(cameras, offset.into(), checksums, self.is_specular);
         let kept = Kept {
             scene: scene.checksum_without_cameras().to_owned(),
             photons: settings.photon_settings(&scene),

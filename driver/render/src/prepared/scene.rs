@@ -62,7 +62,8 @@ impl PreparedScene {
         let scene = Scene::of_cameras(
             scene.cameras.clone(),
             scene.offset,
-            [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
+            [scene.checksum(), scene.checksum_without_cameras(), scene.checksum_of_objects()]
+                .map(str::to_owned),
             scene.is_specular(),
         );
         Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
@@ -88,7 +89,9 @@ impl PreparedScene {
     /// such frame.
     pub fn frame(&self, number: u32) -> Option<Scene> {
         let View { cameras, checksum } = self.frames.get(&number)?;
-        let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
+        let Self { scene, .. } = self;
+        let checksums = [checksum, scene.checksum_without_cameras(), scene.checksum_of_objects()];
+        let checksums = checksums.map(str::to_owned);
         let offset = self.scene.offset;
         Some(Scene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }

@@ -381,7 +381,9 @@ impl<'a> Pilot<'a> {
         let max_distance = self.mapped.max_distance;
         let neighbors = settings.photons.caustic_neighbors;
         let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
-        Ok(settings.frame(&camera, max_distance, caustics))
+        let frame = settings.frame(&camera, max_distance, caustics);
+        // The pilot reads light alone, and its card image may have no identities.
+        Ok(FrameParameters { position: false, coverage: false, identities: false, ..frame })
     }
 
     fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {

@@ -153,7 +153,7 @@ impl RenderSettings {
 
     /// Checks that the tile fits into the chip with the sums of all layers that chips render.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
-        let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
+        let most = budget.pixels_of_tile(self.picture.layers.separate_light()).isqrt();
         let side = self.schedule.tile.unwrap_or(1);
         if side <= most {
             return Ok(());

@@ -55,6 +55,9 @@ impl RenderSettings {
             ("layout", json!(LAYOUT_VERSION)),
             ("scene-checksum", json!(scene.checksum())),
         ]));
+        if self.picture.layers.have_mattes() {
+            identity.insert("objects-checksum".to_owned(), json!(scene.checksum_of_objects()));
+        }
         identity
     }
 }

@@ -8,7 +8,7 @@ use photoncard_map::photon_map::{PhotonLayout, PhotonsFor};
 use photoncard_picture::film::Window;
 use photoncard_picture::layer::Layers;
 use photoncard_scene::Aperture;
-use photoncard_shared::message::{Filter, Radiance, Sampling};
+use photoncard_shared::message::{Filter, PixelForm, Radiance, Sampling};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -57,9 +57,18 @@ pub struct Picture {
     pub layers: Layers,
     /// Pixel filter.
     pub filter: Filter,
+    /// True if the environment is black where eye rays see it directly. Files then have alpha, and radiance is
+    /// premultiplied.
+    pub transparent: bool,
 }
 
 impl Picture {
+    /// Optional contents of pixels that the picture's files need.
+    pub fn form(&self) -> PixelForm {
+        let form = self.layers.form();
+        PixelForm { coverage: form.coverage || self.transparent, ..form }
+    }
+
     /// Window of the picture that is rendered.
     pub(super) fn window(&self) -> Window {
         self.crop.unwrap_or(Window::full(self.width, self.height))
@@ -87,6 +96,7 @@ impl Picture {
             focus,
             layers,
             filter,
+            transparent,
         } = self;
         let pair = |numbers: Option<[f32; 2]>| (Some(json!(numbers)), numbers.map(|numbers| list(&numbers)));
         let aperture = aperture.map(|aperture| aperture.to_string());
@@ -94,6 +104,8 @@ impl Picture {
         let Window { x0, x1, y0, y1 } = self.window();
         let window = [x0, x1, y0, y1];
         // The identity of a picture has only the layers that chips send on request.
+        // A picture with a background has the provenance that it had before there was a choice.
+        let transparent = if *transparent { (Some(json!(true)), Some(String::new())) } else { UNSTATED };
         let aov = (Some(json!(layers.of_chip().to_string())), Some(layers.to_string()));
         vec![
             setting(Pixels, "picture.width", "size", size),
@@ -110,6 +122,7 @@ impl Picture {
             setting(Pixels, "picture.focus", "focus", optional(*focus)),
             setting(Pixels, "picture.layers", "aov", aov),
             setting(Pixels, "picture.filter", "filter", name(*filter)),
+            setting(Pixels, "picture.transparent", "transparent", transparent),
         ]
     }
 }
@@ -131,6 +144,7 @@ impl Default for Picture {
             focus: None,
             layers: Layers::default(),
             filter: Filter::Box,
+            transparent: false,
         }
     }
 }

@@ -9,7 +9,7 @@ mod setting;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::Budget;
-use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale, Tile};
+use photoncard_shared::message::{self, CausticGather, FrameParameters, PixelForm, SumScale, Tile};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
@@ -75,7 +75,7 @@ impl RenderSettings {
         if let Some(side) = self.schedule.tile {
             return side;
         }
-        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.are_of_chip()));
+        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.separate_light()));
         let widest = room.min().unwrap_or(NARROWEST_TILE.pow(2)).isqrt().max(1);
         let window = self.window();
         let wanted = if budgets.len() > 1 { TILES_OF_CARD * budgets.len() as u64 } else { 1 };
@@ -103,9 +103,9 @@ impl RenderSettings {
     /// # Errors
     /// If the picture's size or its crop window is not possible.
     pub fn film(&self, scale: SumScale) -> Result<Film, FilmError> {
-        let layers = self.picture.layers.are_of_chip();
+        let form = self.picture.form();
         let Integrator { samples, adaptive_threshold, .. } = self.integrator;
-        let format = SumFormat::of_range(layers, (0, samples), adaptive_threshold.is_some(), scale);
+        let format = SumFormat::of_range(form, (0, samples), adaptive_threshold.is_some(), scale);
         Film::new(self.picture.width, self.picture.height, self.window(), format)
     }
 
@@ -184,6 +184,7 @@ impl RenderSettings {
         max_distance: f32,
         caustics: Option<CausticGather>,
     ) -> FrameParameters {
+        let PixelForm { layers, position, coverage, identities } = self.picture.form();
         FrameParameters {
             width: self.picture.width,
             height: self.picture.height,
@@ -203,11 +204,15 @@ impl RenderSettings {
             queue: self.schedule.queue.unwrap_or(u32::MAX),
             radiance: self.photons.radiance,
             caustics,
-            layers: self.picture.layers.are_of_chip(),
+            layers,
             filter: self.picture.filter,
             in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
             keep_records: self.keeps_records(),
             adaptive_threshold: self.integrator.adaptive_threshold,
+            transparent: self.picture.transparent,
+            position,
+            coverage,
+            identities,
         }
     }
 }

@@ -78,6 +78,11 @@ fn triangles_and_primitives(primitives: &[Primitive<'_>]) -> u64 {
     primitives.iter().fold(0, |sum: u64, primitive| sum.saturating_add(primitive.triangles).saturating_add(1))
 }
 
+/// Index of the object that is being placed: the last one of the scene.
+fn object_of(scene: &Scene) -> u32 {
+    scene.objects.len().saturating_sub(1) as u32
+}
+
 impl<'a> MeshPlacer<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
         Self {
@@ -248,7 +253,7 @@ impl<'a> MeshPlacer<'a> {
         if !instance.bounds(bounds).iter().all(is_near) {
             return Ok(false);
         }
-        let instance = Instance { group: index, ..instance };
+        let instance = Instance { group: index, object: object_of(scene), ..instance };
         allocation::push(&mut scene.instances, instance).map_err(|error| {
             SceneError::memory(&self.source.document.path, "placing its instances", error)
         })?;
@@ -326,9 +331,11 @@ impl<'a> MeshPlacer<'a> {
         let source = self.source;
         let no_memory = |error| SceneError::memory(&source.document.path, "placing its triangles", error);
         let tangents = reader.tangents()?;
+        let object = object_of(scene);
         for triangle in 0..primitive.triangles {
             let corners = reader.corners(triangle, pose)?;
-            let mut placed = Triangle::new(reader.places(&corners)?, primitive.material);
+            let plain = Triangle::new(reader.places(&corners)?, primitive.material);
+            let mut placed = Triangle { object, ..plain };
             if placed.area() <= 0.0 {
                 scene.skipped_triangles += 1;
                 continue;

@@ -13,6 +13,12 @@ pub(super) fn node_name(root: &json::Root, node: usize) -> String {
     name.map_or_else(|| format!("node {node}"), |name| format!("node '{name}'"))
 }
 
+/// Name of the object that a node is: the node's name, or `node N`.
+pub(super) fn object_name(root: &json::Root, node: usize) -> String {
+    let name = root.nodes.get(node).and_then(|node| node.name.clone());
+    name.unwrap_or_else(|| format!("node {node}"))
+}
+
 /// List of names in quotation marks, for an error that offers them as choices.
 pub(super) fn listed(names: &[String]) -> String {
     if names.is_empty() {

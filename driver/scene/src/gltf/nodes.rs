@@ -13,6 +13,7 @@ use super::extent::Anchor;
 use super::instances::Instances;
 use super::light::LightPlacer;
 use super::mesh::MeshPlacer;
+use super::names::object_name;
 use super::notices::Notices;
 use super::pose::Pose;
 use super::room::Room;
@@ -133,6 +134,7 @@ impl<'a> Placer<'a> {
         let document = self.source.document;
         let node = &document.root.nodes[index];
         if let Some(mesh) = node.mesh {
+            scene.objects.push(object_name(&document.root, index));
             let weights = self.weights(index, mesh.value());
             match node.skin {
                 Some(skin) => self.place_skinned((mesh.value(), weights), skin.value(), world, scene)?,

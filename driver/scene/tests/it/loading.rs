@@ -178,6 +178,23 @@ fn nodes_place_meshes_by_matrix_or_by_parts_through_their_parents() {
     }
 }
 
+#[test]
+fn an_object_is_a_node_with_triangles() {
+    let scene = load_changed(|json| {
+        json["nodes"] = json!([
+            {"name": "parent", "children": [2]},
+            {"camera": 0},
+            {"mesh": 0},
+            {"name": "chair", "mesh": 0},
+            {"name": "table", "mesh": 0}
+        ]);
+        json["scenes"] = json!([{"nodes": [4, 0, 1, 3]}]);
+    })
+    .unwrap();
+    let names = scene.triangles.iter().map(|triangle| &*scene.objects[triangle.object as usize]);
+    assert!(names.eq(["table", "node 2", "chair"]));
+}
+
 /// A mirroring transform flips the winding, so that the front stays on the side of the normal.
 #[test]
 fn mirrored_nodes_keep_their_front() {

@@ -198,7 +198,10 @@ impl Fixture {
     }
 
     fn of(scene: &Scene, settings: RenderSettings) -> Self {
-        let packed = PackedScene::new(scene).unwrap();
+        let packed = match settings.picture.layers.have_mattes() {
+            true => PackedScene::with_identities(scene).unwrap(),
+            false => PackedScene::new(scene).unwrap(),
+        };
         let mapped = map_photons(packed, &settings.photon_settings(scene), &|_| true).unwrap();
         let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
         let limits = PixelLimits::new(&mapped.image.view().0.header, &frame);

@@ -9,7 +9,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
     self, Board, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, Invariant, MemoryUse,
-    OPERAND_BYTES, PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile, record_bytes,
+    OPERAND_BYTES, PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile,
 };
 use photoncard_shared::transport::Transport;
 
@@ -361,7 +361,7 @@ impl<K: ChipKind> Engine<K> {
         sums: &PixelSums,
         transport: &mut Transport,
     ) -> Result<(), Fault> {
-        let bytes = record_bytes(sums.layers.is_some());
+        let bytes = sums.form().record_bytes();
         let (first_tile, first) = self.first;
         let next = first + (self.data.len() / bytes) as u32;
         if (tile, index) != (first_tile, next) {

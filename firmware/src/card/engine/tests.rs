@@ -4,7 +4,7 @@ use std::boxed::Box;
 use std::vec;
 
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::message::CHUNK_LINES;
+use photoncard_shared::message::{CHUNK_LINES, PIXEL_BYTES};
 
 use super::*;
 use crate::kind::Micro;
@@ -20,7 +20,7 @@ fn full() -> Box<Engine<Micro>> {
 #[test]
 fn a_pixel_without_room_in_its_reply_is_a_fault() {
     let (mut engine, mut transport) = (full(), Transport::card());
-    let next = (DATA_BYTES / record_bytes(false)) as u32;
+    let next = (DATA_BYTES / PIXEL_BYTES) as u32;
     let sums = PixelSums::default();
     assert_eq!(engine.add_pixel((0, next), &sums, &mut transport), Err(Invariant::Reply.fault()));
     // The pixel of another tile begins a reply of its own.

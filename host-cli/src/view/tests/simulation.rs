@@ -135,7 +135,7 @@ fn a_reset_keeps_the_layers_that_pages_show() {
         world.send(0, &json!({"type": "layer", "name": layer}));
         world.send(0, &json!({"type": "reset"}));
         world.settle();
-        assert_eq!(world.view.wish().settings.picture.layers.are_of_chip(), is_of_chip, "{layer}");
+        assert_eq!(world.view.wish().settings.picture.layers.separate_light(), is_of_chip, "{layer}");
     }
 }
 

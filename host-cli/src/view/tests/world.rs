@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::time::Duration;
 
-use photoncard_driver::film::{FilmPixel, PixelLayers, PixelValue, SumFormat, Window};
+use photoncard_driver::film::{FilmPixel, PixelValue, SumFormat, Window};
 use photoncard_driver::scene::{Camera, Material, Scene, SceneContents, Triangle};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_driver::sink::FinishedTile;
@@ -157,7 +157,7 @@ impl World {
             Some(tile) => {
                 let radiance = [f32::from_bits(bits(&job.task.wish, job.task.origin.step)); 3];
                 let pixel = PixelValue { radiance, depth: 2.0, ..PixelValue::default() };
-                let sums = SumFormat::ONE.sums(&FilmPixel { pixel, layers: PixelLayers::default() });
+                let sums = SumFormat::ONE.sums(&FilmPixel { pixel, ..FilmPixel::default() });
                 let sums = std::iter::repeat_n(sums, tile.pixels() as usize);
                 let tile = FinishedTile::of_pixels(tile, sums, SumFormat::ONE).unwrap();
                 let origin = job.task.origin;
