@@ -245,15 +245,14 @@ fn image_of(
 
 fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples> {
     let Content { film, layers, denoised, is_transparent, identities: _ } = content;
-    let stored = |channel: &Channel, format: SampleFormat| {
-        any_channel(channel.name, film.all().map(|pixel| (channel.value)(&pixel)), format)
-    };
-    let mut list: SmallVec<_> = Layers::colour().iter().map(|channel| stored(channel, format)).collect();
-    list.extend(is_transparent.then(|| stored(&COLOUR_ALPHA, format)));
+    let mut asked: Vec<(Channel, SampleFormat)> = Vec::new();
+    asked.extend(Layers::colour().iter().map(|channel| (*channel, format)));
+    asked.extend(is_transparent.then_some((COLOUR_ALPHA, format)));
     for layer in layers.iter() {
         let format = if layer.is_always_single() { SampleFormat::Float } else { format };
-        list.extend(layer.channels().iter().map(|channel| stored(channel, format)));
+        asked.extend(layer.channels().iter().map(|channel| (*channel, format)));
     }
+    let mut list: SmallVec<_> = of_film(film, &asked).collect();
     for (matte, identities) in mattes(content) {
         let values = matte.values(film, identities).into_iter();
         list.extend(matte.channels().zip(values).map(|(name, values)| single(&name, values)));
@@ -263,6 +262,29 @@ fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples>
         list.extend(DENOISED.into_iter().enumerate().map(of_channel));
     }
     AnyChannels::sort(list)
+}
+
+/// Channels of a film's values. Each pixel is decoded once for all.
+fn of_film<'a>(
+    film: &Film,
+    asked: &'a [(Channel, SampleFormat)],
+) -> impl Iterator<Item = AnyChannel<FlatSamples>> + use<'a> {
+    let empty = |format| match format {
+        SampleFormat::Half => FlatSamples::F16(Vec::new()),
+        SampleFormat::Float => FlatSamples::F32(Vec::new()),
+    };
+    let mut samples: Vec<FlatSamples> = asked.iter().map(|(_, format)| empty(*format)).collect();
+    for pixel in film.all() {
+        for ((channel, _), samples) in asked.iter().zip(&mut samples) {
+            let value = (channel.value)(&pixel);
+            match samples {
+                FlatSamples::F16(halves) => halves.push(to_half(value)),
+                FlatSamples::F32(floats) => floats.push(value),
+                FlatSamples::U32(_) => {}
+            }
+        }
+    }
+    asked.iter().zip(samples).map(|((channel, _), samples)| AnyChannel::new(channel.name, samples))
 }
 
 /// Mattes of a picture with names.
