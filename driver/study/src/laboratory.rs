@@ -1,5 +1,6 @@
 //! Measures points whose results are not in the store yet. Points with the same card image are measured one
-//! after another, so that photons are traced once for all of them.
+//! after another, so that photons are traced once for all of them. Frames that are rendered on one chip each
+//! are measured at once, one a thread.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use photoncard_render::RenderError;
 use photoncard_render::emulator::direct::TileMemory;
 use photoncard_render::parts::Part;
 use photoncard_scene::{Scene, gltf};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -89,9 +91,9 @@ pub struct Laboratory<'a> {
     loaded: HashMap<String, Scene>,
     /// Card image of the last point, kept for a next point that needs the same image.
     last: Option<LastImage>,
-    /// Reference render of the last point with [`Task::Quality`], kept for a next point that needs the same
-    /// reference.
-    reference: Option<SceneReference>,
+    /// Reference renders of the points with [`Task::Quality`], kept for other points that need the same
+    /// references.
+    references: Vec<SceneReference>,
 }
 
 struct LastImage {
@@ -129,7 +131,7 @@ impl<'a> Laboratory<'a> {
             united: None,
             loaded: HashMap::new(),
             last: None,
-            reference: None,
+            references: Vec::new(),
         })
     }
 
@@ -193,13 +195,14 @@ impl<'a> Laboratory<'a> {
             }
         }
         self.observer.progress(study, results.len(), total, false);
-        for point in missing {
+        for points in missing.chunk_by(are_measured_together) {
             if self.observer.is_stopped() {
                 return Err(StudyError::Stopped);
             }
-            let outcome = self.measured(&point)?;
-            results.push((point, outcome));
-            self.observer.progress(study, results.len(), total, true);
+            for (point, outcome) in points.iter().zip(self.measured(points)?) {
+                results.push((point.clone(), outcome));
+                self.observer.progress(study, results.len(), total, true);
+            }
         }
         Ok(Results::new(results))
     }
@@ -249,28 +252,68 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// Measures a point and stores its outcome.
-    fn measured(&mut self, point: &Point) -> Result<Outcome, StudyError> {
-        let outcome = match self.measure_one(point) {
-            Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
-            outcome => outcome?,
-        };
-        let key = self.key(point)?;
-        self.store.put(&point.name(), &key, &outcome)?;
-        Ok(outcome)
+    /// Measures points [together](are_measured_together), and stores the outcome of each.
+    fn measured(&mut self, points: &[Point]) -> Result<Vec<Outcome>, StudyError> {
+        match self.measure_together(points) {
+            Err(StudyError::Render(RenderError::Stopped)) => Err(StudyError::Stopped),
+            outcomes => outcomes,
+        }
     }
 
     fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
         Ok(point.key(self.load(&point.scene)?.checksum()))
     }
 
-    fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
-        point.check()?;
-        let last = self.image(point)?;
+    fn measure_together(&mut self, points: &[Point]) -> Result<Vec<Outcome>, StudyError> {
+        points.iter().try_for_each(Point::check)?;
+        let keys: Vec<_> = points.iter().map(|point| self.key(point)).collect::<Result<_, _>>()?;
+        let last = self.image(&points[0])?;
+        points.iter().try_for_each(|point| self.add_reference(&last, point))?;
+        let outcomes = match points {
+            [point] => vec![self.measure_one(&last, point, &keys[0])?],
+            _ => self.measure_whole_frames(&last, points, &keys)?,
+        };
+        self.last = Some(last);
+        Ok(outcomes)
+    }
+
+    /// Measures frames that are rendered on one chip each, as many at a time as there are threads.
+    fn measure_whole_frames(
+        &self,
+        last: &LastImage,
+        points: &[Point],
+        keys: &[Value],
+    ) -> Result<Vec<Outcome>, StudyError> {
+        let frames = points.par_iter().zip(keys).with_max_len(1);
+        self.pool.install(|| frames.map(|(point, key)| self.measure_one(last, point, key)).collect())
+    }
+
+    fn bench<'b>(&'b self, last: &'b LastImage, is_stopped: &'b (dyn Fn() -> bool + Sync)) -> Bench<'b> {
+        Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped }
+    }
+
+    /// Renders the reference of a point with [`Task::Quality`], unless it is known.
+    fn add_reference(&mut self, last: &LastImage, point: &Point) -> Result<(), RenderError> {
+        let Task::Quality { tiles, reference_rays } = point.task else { return Ok(()) };
+        if self.reference(point).is_none() {
+            let is_stopped = || self.observer.is_stopped();
+            let bench = self.bench(last, &is_stopped);
+            self.references.push(SceneReference::new(&bench, point, tiles, reference_rays)?);
+        }
+        Ok(())
+    }
+
+    /// Known reference of a point with [`Task::Quality`].
+    fn reference(&self, point: &Point) -> Option<&Reference> {
+        let known = self.references.iter().find(|known| known.is_of(point))?;
+        Some(&known.reference)
+    }
+
+    /// Measures a point with its card image, and stores the outcome.
+    fn measure_one(&self, last: &LastImage, point: &Point, key: &Value) -> Result<Outcome, StudyError> {
         check_image(&last.mapped.image, &point.chip().budget()).map_err(RenderError::from)?;
         let is_stopped = || self.observer.is_stopped();
-        let bench =
-            Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
+        let bench = self.bench(last, &is_stopped);
         let frame = bench.frame(&point.settings)?;
         point.settings.check_waiting_room(&frame, &last.mapped.image, &point.chip().budget())?;
         let outcome = match &point.task {
@@ -281,18 +324,12 @@ impl<'a> Laboratory<'a> {
                 let model = TileMemory { caches, has_reuse: *has_reuse };
                 Outcome::Traffic(bench.traffic(&point.settings, *chip, model, *sample, *least_tiles)?)
             }
-            &Task::Quality { tiles, reference_rays } => {
-                let known = self.reference.take().filter(|known| known.is_of(point, tiles, reference_rays));
-                let reference = match known {
-                    Some(known) => known,
-                    None => SceneReference::new(&bench, point, tiles, reference_rays)?,
-                };
-                let quality = reference.reference.compare(&bench, &point.settings)?;
-                self.reference = Some(reference);
-                Outcome::Quality(quality)
+            Task::Quality { .. } => {
+                let reference = self.reference(point).expect("references are rendered first");
+                Outcome::Quality(reference.compare(&bench, &point.settings)?)
             }
         };
-        self.last = Some(last);
+        self.store.put(&point.name(), key, &outcome)?;
         Ok(outcome)
     }
 
@@ -329,11 +366,19 @@ impl SceneReference {
         })
     }
 
-    fn is_of(&self, point: &Point, tiles: usize, rays: u32) -> bool {
+    /// Returns whether this is the reference of a point.
+    fn is_of(&self, point: &Point) -> bool {
+        let Task::Quality { tiles, reference_rays } = point.task else { return false };
         self.scene == point.scene
             && self.assignments == point.assignments
-            && self.reference.is_of(&point.settings, tiles, rays)
+            && self.reference.is_of(&point.settings, tiles, reference_rays)
     }
+}
+
+/// Returns whether two points are measured at once: frames that are rendered on one chip each, from the same
+/// card image.
+fn are_measured_together(point: &Point, other: &Point) -> bool {
+    point.is_on_one_chip() && other.is_on_one_chip() && point.image_key() == other.image_key()
 }
 
 /// Removes duplicate points, and sorts the others so that points with the same card image are adjacent.

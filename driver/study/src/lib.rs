@@ -75,8 +75,9 @@ pub struct StudyOptions {
 }
 
 /// Measures the points of all studies, and writes a report for each study and `figures.csv` with the key
-/// figures of all. A collection of the nominal scale has the page [`dissertation`] too. Results are stored in
-/// the folder `points` of [`StudyOptions::out`], so that a later run does not measure the same points again.
+/// figures of all. A collection of the nominal scale has the page [`dissertation`] too. The points of a
+/// collection are measured before its first report is written. Results are stored in the folder `points` of
+/// [`StudyOptions::out`], so that a later run does not measure the same points again.
 ///
 /// # Errors
 /// If a scene is missing, a point cannot be measured, a file cannot be written, the observer stops the study,
@@ -85,6 +86,9 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
     match &options.extent {
+        Extent::Whole if options.is_collection => {
+            laboratory.measure(COLLECTION, &all_points(options))?;
+        }
         Extent::Whole => {}
         Extent::Part { part, command } => return run_part(options, (*part, command), laboratory, &mut bench),
         Extent::Merged(united) => {
@@ -111,6 +115,14 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
         figures::write_claims(&options.out, &figures)?;
     }
     figures::write(&options.out, &options.scale, check, figures)
+}
+
+/// Name of the measurements of several studies.
+const COLLECTION: &str = "all";
+
+/// Points of all studies. Measured together, those of different studies share card images and references.
+fn all_points(options: &StudyOptions) -> Vec<Point> {
+    options.studies.iter().flat_map(|study| study.points(&options.scale)).collect()
 }
 
 /// Measures the share of a part, and writes its record. The first part measures the host's work.

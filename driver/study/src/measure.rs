@@ -1,6 +1,6 @@
 //! Measures a point: work and memory traffic of a sample of a picture's tiles.
 
-use photoncard_cards::scheduler::tiles;
+use photoncard_cards::scheduler::{GatherOrder, tiles};
 use photoncard_map::photon_map::{MappedImage, PhotonMapSize};
 use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::contents::Contents;
@@ -13,7 +13,7 @@ use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Drain, FrameParameters, Tile};
+use photoncard_shared::message::{FrameParameters, Tile};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
@@ -223,10 +223,7 @@ impl Bench<'_> {
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
         let all = all_tiles(settings, chip);
-        let is_in_rounds = frame.drain == Drain::Buckets;
-        let are_several =
-            settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1;
-        if is_in_rounds || are_several {
+        if is_on_one_chip(settings, chip) {
             return self.in_flight(chip, &frame, &all, model);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
@@ -294,6 +291,14 @@ impl Bench<'_> {
             map: PhotonMapSize::of(image),
         })
     }
+}
+
+/// Returns whether one chip of the kind `chip` renders a whole frame with `settings`, because gathers of
+/// several tiles wait at once, in its queue or in card memory.
+pub(crate) fn is_on_one_chip(settings: &RenderSettings, chip: EmulatedKind) -> bool {
+    let order = settings.schedule.order;
+    let in_flight = settings.schedule.in_flight.unwrap_or(u32::MAX).min(chip.budget().in_flight);
+    order == GatherOrder::Buckets || (order.has_queue() && in_flight > 1)
 }
 
 /// Returns all tiles of a picture that chips of the kind `chip` render with `settings`.

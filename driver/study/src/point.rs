@@ -7,6 +7,7 @@ use photoncard_render::{NamedSettings, PROGRAM, PhotonMaps, RenderError, RenderS
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
+use super::measure::is_on_one_chip;
 use super::sample::SampleRate;
 
 /// Maximum number of characters of a scene's name within the name of a point's file.
@@ -66,6 +67,12 @@ impl Point {
             Task::Traffic { chip, .. } => chip,
             Task::Quality { .. } => EmulatedKind::Reference,
         }
+    }
+
+    /// Returns whether one chip renders a whole frame, on one thread, to measure the point.
+    pub(super) fn is_on_one_chip(&self) -> bool {
+        let is_traffic = matches!(self.task, Task::Traffic { .. });
+        is_traffic && !self.is_along_curve && is_on_one_chip(&self.settings, self.chip())
     }
 
     /// Checks the settings against each other, and against the kind of chip.

@@ -124,6 +124,12 @@ impl Estimate {
         Self { value, half_width: students_t(sample.len() - 1) * error }
     }
 
+    /// Value with the ends of its interval.
+    pub(crate) fn with_ends(self) -> Ratio {
+        let Self { value, half_width } = self;
+        Ratio { value, lower: value - half_width, upper: value + half_width }
+    }
+
     /// Multiplies the estimate by `factor`, for another unit.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
@@ -168,6 +174,34 @@ pub(super) fn ratio_of_sums(sample: &[(f64, f64, usize)]) -> Ratio {
         .collect();
     let half_width = Estimate::of_total(&residuals).half_width / denominator.abs();
     Ratio { value, lower: value - half_width, upper: value + half_width }
+}
+
+/// Product of the ratios `a / b` and `c / d` of sums over the same members. Each element has `[a, b, c, d]` of
+/// a member and its weight. The interval is that of the first-order change of the product's logarithm by each
+/// member, so that what varies alike in several sums cancels.
+pub(super) fn product_of_ratios(sample: &[([f64; 4], usize)]) -> Ratio {
+    let sum = |index: usize| sample.iter().map(|(values, weight)| values[index] * *weight as f64).sum();
+    let sums: [f64; 4] = [0, 1, 2, 3].map(sum);
+    let value = sums[0] / sums[1] * sums[2] / sums[3];
+    let change = |values: &[f64; 4]| {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|index| values[index] / sums[index]);
+        a - b + c - d
+    };
+    let changes: Vec<_> = sample.iter().map(|(values, weight)| (change(values), *weight)).collect();
+    let spread = Estimate::of_total(&changes).half_width.exp();
+    Ratio { value, lower: value / spread, upper: value * spread }
+}
+
+/// Greatest of several numbers, each with its interval. The interval reaches from the greatest lower end to
+/// the greatest upper end. Its upper end is exact; the lower one is too high, if several numbers are about as
+/// great.
+pub(super) fn greatest(numbers: impl IntoIterator<Item = Ratio>) -> Ratio {
+    let none = Ratio { value: 0.0, lower: 0.0, upper: 0.0 };
+    numbers.into_iter().fold(none, |greatest, number| Ratio {
+        value: greatest.value.max(number.value),
+        lower: greatest.lower.max(number.lower),
+        upper: greatest.upper.max(number.upper),
+    })
 }
 
 /// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). Element `i` of
@@ -311,6 +345,28 @@ mod tests {
         assert!(noisy.lower < noisy.value && noisy.value < noisy.upper && noisy.upper < 1.1 * noisy.value);
         let all: Vec<_> = members(10.0).into_iter().map(|(n, d, _)| (n, d, 1)).collect();
         assert_eq!(ratio_of_sums(&all).lower, ratio_of_sums(&all).upper);
+    }
+
+    #[test]
+    fn the_interval_of_a_product_is_that_of_a_ratio_if_the_other_ratio_is_one() {
+        let member = |index: u32| (f64::from(hash(index) % 100 + 50), f64::from(hash(index + 40) % 100 + 50));
+        let pairs: Vec<_> = (0..40).map(member).collect();
+        let ratios: Vec<_> = pairs.iter().map(|&(a, b)| (a, b, 17)).collect();
+        let products: Vec<_> = pairs.iter().map(|&(a, b)| ([a, b, b, b], 17)).collect();
+        let (ratio, product) = (ratio_of_sums(&ratios), product_of_ratios(&products));
+        assert!((product.value - ratio.value).abs() < 1e-12);
+        let width = (ratio.upper - ratio.lower) / (2.0 * ratio.value);
+        assert!(((product.upper / product.value).ln() - width).abs() < 1e-12);
+        let changing: Vec<_> = pairs.iter().map(|&(a, b)| ([a, b, b, a], 17)).collect();
+        let one = product_of_ratios(&changing);
+        assert!((one.value - 1.0).abs() < 1e-12 && one.upper - one.lower < 1e-9);
+    }
+
+    #[test]
+    fn the_greatest_number_has_the_greatest_ends() {
+        let ends = |value, lower, upper| Ratio { value, lower, upper };
+        let of = greatest([ends(2.0, 1.0, 4.0), ends(3.0, 2.5, 3.5), ends(1.0, 0.5, 1.5)]);
+        assert_eq!([of.value, of.lower, of.upper], [3.0, 2.5, 4.0]);
     }
 
     #[test]

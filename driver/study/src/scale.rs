@@ -10,6 +10,7 @@ use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::memory_model::CacheSettings;
 use photoncard_render::{ChipModel, Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
 
+use super::measure::is_on_one_chip;
 use super::point::{Point, Task};
 use super::sample::SampleRate;
 use super::symbol_axes::SymbolAxes;
@@ -64,8 +65,8 @@ impl Scale {
         sample: SampleRate::ALL,
         least_tiles: 15,
         quality_tiles: 48,
-        quality_seeds: 4,
-        reference_rays: 1600,
+        quality_seeds: 2,
+        reference_rays: 800,
         is_quick: false,
         machine: Machine::NOMINAL,
         model: None,
@@ -208,16 +209,17 @@ impl Scale {
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
-    /// Point that measures the memory traffic of all tiles on chips of kind `chip` with `caches`. If a chip
-    /// has several tiles in flight in a gather queue, one chip renders all tiles.
-    pub(super) fn on_one_chip(
+    /// Point that measures the memory traffic on chips of kind `chip` with `caches`: of a sample of the tiles,
+    /// or of all if gathers of several tiles wait at once, on one chip.
+    pub(super) fn on_chip(
         &self,
         scene: &str,
         settings: RenderSettings,
         chip: EmulatedKind,
         caches: CacheSettings,
     ) -> Point {
-        let (sample, least_tiles) = (SampleRate::ALL, self.least_tiles);
+        let sample = if is_on_one_chip(&settings, chip) { SampleRate::ALL } else { self.sample };
+        let least_tiles = self.least_tiles;
         let task = Task::Traffic { chip, caches, sample, least_tiles, has_reuse: false };
         Point { task, ..self.traffic_behind(scene, settings, caches) }
     }

@@ -26,8 +26,8 @@ techniques that it does not have.
 - *not covered*: nothing here says anything about it.
 
 A condition is the published value, with 25 % to either side where a value is given and no bound. Intervals are of sampled tiles, and at equal quality of the
-tiles that are compared. Figures without an interval are of whole frames, or of the maximum of a curve. Pictures, scenes and caches are not the dissertation's:
-its Sponza atrium, modified Cornell box and associativity are not known. GB of rows *GI* and of figure 6.17 are bytes of the photon map from DRAM in a frame;
+tiles that are compared. Figures without an interval are of whole frames. Pictures, scenes and caches are not the dissertation's: its Sponza atrium,
+modified Cornell box and associativity are not known. GB of rows *GI* and of figure 6.17 are bytes of the photon map from DRAM in a frame;
 all others have the scene, and what waits in card memory, too.
 ";
 

@@ -1,5 +1,5 @@
-//! Study of tiles in flight: memory traffic of whole frames, in which the gathers of one or of several tiles
-//! wait in a chip's queue at once.
+//! Study of tiles in flight: memory traffic of frames in which the gathers of one or of several tiles wait in
+//! a chip's queue at once.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::{LARGE, REFERENCE};
@@ -12,7 +12,8 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{Block, Table};
 use super::super::scale::Scale;
-use super::present::{GIGA, SCENES, columns, table, text};
+use super::headlines::SCENES;
+use super::present::{GIGA, columns, gigabytes, table, text};
 
 /// A kind of chip, its order and number of tiles in flight, and its caches.
 #[derive(Clone, Copy)]
@@ -57,8 +58,7 @@ const fn with_scene_cache(bytes: u32) -> CacheSettings {
 /// and gathers in card memory if it has room for their tables.
 fn setups(scale: &Scale) -> Vec<Setup> {
     if scale.model.is_none() {
-        let large_in_card_memory = Setup { chip: EmulatedKind::Large, ..IN_CARD_MEMORY };
-        return vec![ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT, IN_CARD_MEMORY, large_in_card_memory];
+        return vec![ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT, IN_CARD_MEMORY];
     }
     let budget = scale.chip().budget();
     let order = GatherOrder::Sort;
@@ -70,11 +70,11 @@ fn setups(scale: &Scale) -> Vec<Setup> {
 }
 
 impl Setup {
-    /// Point that renders all tiles of the frame with this setup.
+    /// Point that renders the frame with this setup: a sample of the tiles if none waits for another.
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
         let settings =
             settings.with(|s| (s.schedule.in_flight, s.schedule.order) = (Some(self.in_flight), self.order));
-        scale.on_one_chip(scene, settings, self.chip, self.caches.unwrap_or_else(|| self.chip.caches()))
+        scale.on_chip(scene, settings, self.chip, self.caches.unwrap_or_else(|| self.chip.caches()))
     }
 }
 
@@ -105,15 +105,14 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
         ("photon map: less than naive", "times"),
         ("all: less than naive", "times"),
     ];
-    let title = format!("All techniques at {} gather rays, whole frames", scale.gather_rays);
+    let title = format!("All techniques at {} gather rays", scale.gather_rays);
     let mut rows = Table::new(title, columns(&heads));
     for (scene, name) in SCENES {
         let naive = results.traffic(&naive(scale, scene));
         for setup in setups(scale) {
             let measured = results.traffic(&setup.point(scale, scene, scale.all_on()));
-            let [map, of_scene, all] =
-                [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()]
-                    .map(|estimate| estimate.value);
+            let bytes = [measured.photon_map_bytes(), measured.scene_bytes(), measured.dram_bytes()];
+            let [map, of_scene, all] = bytes.map(|estimate| estimate.value);
             let budget = setup.chip.budget();
             rows.push(vec![
                 name.into(),
@@ -123,8 +122,8 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
                 setup.in_flight.into(),
                 budget.gather_queue.into(),
                 measured.total(|tile| tile.counters.drains as f64).value.into(),
-                (map / GIGA).into(),
-                (of_scene / GIGA).into(),
+                gigabytes(bytes[0]),
+                gigabytes(bytes[1]),
                 ((all - map - of_scene) / GIGA).into(),
                 (naive.photon_map_bytes().value / map).into(),
                 (naive.dram_bytes().value / all).into(),
@@ -135,7 +134,7 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
         text(
             "With one tile in flight a chip drains its queue at the end of every tile, however few gathers wait; with several, when \
              the queue is full. With the order buckets gathers wait in card memory, and caches take the memory that casting rays and \
-             doing gathers leave free. A frame with several tiles that wait is rendered as a whole, on one chip.",
+             doing gathers leave free. A frame with several tiles that wait is rendered as a whole, on one chip; the others are sampled.",
         ),
         table("tiles-in-flight", rows),
     ]

@@ -5,6 +5,7 @@ use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonLayout;
 
 use super::super::laboratory::Results;
+use super::super::measure::TileMeasurement;
 use super::super::point::Point;
 use super::super::report::{Block, Figure, Table, slug};
 use super::super::sample::{Estimate, Ratio};
@@ -13,7 +14,7 @@ use super::flights::{IN_CARD_MEMORY, LARGE_IN_FLIGHT};
 use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, key, say, table, text};
 
 /// A simple and a large scene: file and name in the report.
-const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
+pub(super) const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
 
 /// Bytes per gather in the dissertation's naive order.
 const PUBLISHED_GATHER_BYTES: f64 = 14_000.0;
@@ -45,10 +46,10 @@ const LINES: [Line; 5] = [
     }),
 ];
 
-/// Numbers of photons in the map. At the nominal scale they are in the dissertation's range of 0.5 to 6
-/// million.
+/// Numbers of photons in the map. At the nominal scale they are the ends of the dissertation's range of 0.5
+/// to 6 million.
 fn photons(scale: &Scale) -> Vec<usize> {
-    scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
+    scale.pick(&[1, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
 }
 
 /// A kind of render with one scene and one number of photons. They determine a point.
@@ -79,10 +80,11 @@ impl Headline {
         results.traffic(&self.point(scale)).dram_bytes()
     }
 
-    /// Bytes of the photon map fetched per gather.
-    fn gather_bytes(&self, scale: &Scale, results: &Results) -> f64 {
+    /// Kilobytes of the photon map fetched per gather.
+    fn gather_kilobytes(&self, scale: &Scale, results: &Results) -> Ratio {
         let measured = results.traffic(&self.point(scale));
-        measured.photon_map_bytes().value / measured.gathers().value
+        let kilobytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64 / 1e3;
+        measured.ratio(kilobytes, |tile| tile.counters.gathers as f64)
     }
 
     /// Ratio of the bytes of the naive order to those of this render, with the same scene and number of
@@ -120,7 +122,7 @@ pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
             headline.photons.into(),
             headline.line.0.into(),
             gigabytes(headline.bytes(scale, results)),
-            (headline.gather_bytes(scale, results) / 1e3).into(),
+            headline.gather_kilobytes(scale, results).value.into(),
         ];
         row.extend([factor.value, factor.lower, factor.upper].map(Into::into));
         rows.push(row);
@@ -147,6 +149,7 @@ pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
     let of = |headline: &Headline| {
         let bytes = headline.bytes(scale, results).scaled(1.0 / GIGA);
         let factor = headline.factor(scale, results);
+        let of_gather = headline.gather_kilobytes(scale, results);
         let figure = |quantity: &str, value: f64, unit| {
             let name = format!("scaling.{quantity}.{}.{}", slug(headline.line.0), headline.photons);
             Figure::new(name, key(headline.scene), value, unit)
@@ -155,7 +158,7 @@ pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
             figure("gigabytes", bytes.value, "GB")
                 .within(bytes.value - bytes.half_width, bytes.value + bytes.half_width),
             figure("factor", factor.value, "times").within(factor.lower, factor.upper),
-            figure("kilobytes-a-gather", headline.gather_bytes(scale, results) / 1e3, "KB"),
+            figure("kilobytes-a-gather", of_gather.value, "KB").within(of_gather.lower, of_gather.upper),
         ]
     };
     Headline::all(scale).iter().flat_map(of).collect()

@@ -26,7 +26,7 @@ const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 /// Sizes of the queue, in gathers, for which times are compared. Points are measured with each size and with
 /// half of each.
 fn queues(scale: &Scale) -> Vec<u32> {
-    let mut queues = scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192]);
+    let mut queues = scale.pick(&[1024, 4096, 16_384], &[2048, 8192]);
     let most = scale.chip().budget().gather_queue;
     queues.retain(|&queue| queue <= most);
     queues

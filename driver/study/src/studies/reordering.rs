@@ -35,6 +35,9 @@ const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Hash,
     GatherOrder::Sort,
 ];
+/// Orders whose traffic is measured with several caches. `tiled` reads about as much as `naive`.
+const CACHED_ORDERS: [GatherOrder; 4] =
+    [GatherOrder::Naive, GatherOrder::DirectionBins, GatherOrder::Hash, GatherOrder::Sort];
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
 /// Side of tiles between the dissertation's and the largest, pixels.
 const LARGER_TILE: u32 = 32;
@@ -56,9 +59,8 @@ fn tiles(scale: &Scale) -> Vec<u32> {
     tiles
 }
 
-fn sizes(scale: &Scale) -> Vec<u32> {
-    scale.pick(&[32, 64, 128, 256, 512], &[32, 128, 512])
-}
+/// Sizes of the photon cache, KB.
+const SIZES: [u32; 3] = [32, 128, 512];
 
 /// Photon caches with 1, 4 and 32 ways, and with 32 ways and a hashed set index, with their names.
 fn associativities() -> [(String, CacheSettings); 4] {
@@ -106,11 +108,12 @@ fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let mut points = Vec::new();
-    for order in ORDERS {
-        let caches = sizes(scale).into_iter().map(of_size);
-        let caches = caches.chain(associativities().map(|(_, caches)| caches));
+    for order in CACHED_ORDERS {
+        let caches = SIZES.map(of_size).into_iter().chain(associativities().map(|(_, caches)| caches));
         points.extend(caches.map(|caches| point(scale, Some(order), PhotonLayout::Jensen, caches)));
-        points.push(point(scale, Some(order), PhotonLayout::Lines, scale.caches()));
+    }
+    for order in ORDERS {
+        points.extend(LAYOUTS.map(|layout| point(scale, Some(order), layout, scale.caches())));
     }
     for layout in LAYOUTS {
         points.extend(tiles(scale).into_iter().map(|tile| sorted(scale, layout, tile)));
@@ -175,8 +178,8 @@ fn figures<'a>(
         nominal(naive, PhotonLayout::Jensen).ratio(|tile| tile.photon_map().raw_bytes as f64, gathers);
     let of_gather = Figure::new("reordering.raw-bytes-of-a-gather.naive", key(CORNELL), value, "bytes");
     let of_gather = of_gather.within(lower, upper);
-    let bound = nominal(None, PhotonLayout::Lines).photon_map_bytes();
-    let bound = Figure::new("reordering.gigabytes.hilbert-lines", key(CORNELL), bound.value / GIGA, "GB");
+    let bound = figure("gigabytes", None, nominal(None, PhotonLayout::Lines).photon_map_bytes());
+    let bound = Figure { name: format!("{}-lines", bound.name), ..bound };
     let [.., (_, many_ways)] = associativities();
     let many_ways = point(scale, Some(GatherOrder::Hash), PhotonLayout::Jensen, many_ways);
     let many_ways = results.traffic(&many_ways).photon_map_bytes();
@@ -372,7 +375,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     let mut heads = vec![Column::new("order", "")];
     heads.extend(caches.iter().map(|(name, _)| Column::new(name.as_str(), "GB")));
     let mut table = Table::new(title, heads);
-    for order in ORDERS {
+    for order in CACHED_ORDERS {
         let mut row = vec![order.name().into()];
         row.extend(caches.iter().map(|&(_, caches)| {
             let point = point(scale, Some(order), PhotonLayout::Jensen, caches);
@@ -393,12 +396,12 @@ fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettin
         });
         series(order.name(), points.collect())
     };
-    ORDERS.map(line).to_vec()
+    CACHED_ORDERS.map(line).to_vec()
 }
 
 fn by_size(scale: &Scale, results: &Results) -> Vec<Block> {
-    let caches: Vec<_> = sizes(scale).into_iter().map(|size| (format!("{size} KB"), of_size(size))).collect();
-    let places: Vec<_> = sizes(scale).into_iter().map(|size| (f64::from(size), of_size(size))).collect();
+    let caches = SIZES.map(|size| (format!("{size} KB"), of_size(size)));
+    let places = SIZES.map(|size| (f64::from(size), of_size(size)));
     let lines = lines_by_caches(scale, results, &places);
     let axes = panel(
         "",

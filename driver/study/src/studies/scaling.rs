@@ -47,9 +47,7 @@ const SWEEPS: [Sweep; 3] = [
         heading: "Photons",
         axis: "photons in the map",
         lines: &[NAIVE, SORT, ALL_ON],
-        values: |scale| {
-            scale.pick(&[1, 2, 4, 8, 12], &[1, 4]).iter().map(|n| n * scale.photons as u32).collect()
-        },
+        values: |scale| scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|n| n * scale.photons as u32).collect(),
         set: |settings, photons| settings.photons.count = photons as usize,
     },
     Sweep {
@@ -57,7 +55,7 @@ const SWEEPS: [Sweep; 3] = [
         heading: "Side of a tile",
         axis: "side of a tile (pixels)",
         lines: &[SORT, SORT_LINES, ALL_ON],
-        values: |scale| powers(4, scale.widest_tile()),
+        values: |scale| powers(8, scale.widest_tile()),
         set: |settings, side| settings.schedule.tile = Some(side),
     },
     Sweep {
@@ -65,10 +63,7 @@ const SWEEPS: [Sweep; 3] = [
         heading: "Size of the queue",
         axis: "gathers that may wait on a chip",
         lines: &[HASH, SORT, SORT_LINES],
-        values: |scale| {
-            let all = powers(256, scale.chip().budget().gather_queue);
-            if scale.is_quick { all.into_iter().step_by(2).collect() } else { all }
-        },
+        values: |scale| powers(256, scale.chip().budget().gather_queue).into_iter().step_by(2).collect(),
         set: |settings, queue| settings.schedule.queue = Some(queue),
     },
 ];

@@ -8,7 +8,7 @@ use super::super::super::laboratory::Results;
 use super::super::super::measure::{Measurement, TileMeasurement};
 use super::super::super::point::Point;
 use super::super::super::report::Figure;
-use super::super::super::sample::{Estimate, Ratio};
+use super::super::super::sample::{Estimate, Ratio, greatest};
 use super::super::super::scale::Scale;
 use super::super::present::{GIGA, GLOSSY, key};
 
@@ -27,7 +27,7 @@ pub(super) const LINES: [Line; 7] = [
 ];
 /// Phong exponents of the floor.
 pub(super) fn exponents(scale: &Scale) -> Vec<u32> {
-    scale.pick(&[1, 2, 4, 8, 16, 32, 64, 128], &[1, 16, 128])
+    scale.pick(&[1, 4, 32, 128], &[1, 16, 128])
 }
 
 /// Name of a line in the report.
@@ -60,21 +60,34 @@ pub(super) fn change(curve: &[Estimate]) -> f64 {
     curve.last().zip(curve.first()).map_or(f64::NAN, |(last, first)| last.value / first.value)
 }
 
-/// Key figures of measurements over the exponent: change, with the confidence interval of the tiles that all
-/// have in common, spread, and greatest value. `name` returns the name of a quantity's figure.
+/// Key figures of measurements over the exponent: change, spread, and greatest value. Their confidence
+/// intervals are of the tiles that all measurements have in common. `name` returns the name of a quantity's
+/// figure.
 pub(super) fn figures(measured: &[&Measurement], name: impl Fn(&str) -> String) -> Vec<Figure> {
-    let bytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64;
-    let curve: Vec<_> = measured.iter().map(|measured| measured.photon_map_bytes()).collect();
-    let greatest = curve.iter().map(|estimate| estimate.value).fold(0.0, f64::max);
     let change = measured.last().zip(measured.first()).map(|(last, first)| last.over(first, bytes));
-    let change = change.map(|Ratio { value, lower, upper }| {
-        Figure::new(name("last-over-first"), key(GLOSSY), value, "").within(lower, upper)
-    });
+    let pairs = measured.iter().flat_map(|one| measured.iter().map(|other| one.over(other, bytes)));
+    let greatest_bytes = greatest(measured.iter().map(|one| one.photon_map_bytes().with_ends()));
+    let figure = |quantity: &str, Ratio { value, lower, upper }: Ratio, giga: f64, unit| {
+        let figure = Figure::new(name(quantity), key(GLOSSY), value / giga, unit);
+        figure.within(lower / giga, upper / giga)
+    };
     let others = [
-        Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
-        Figure::new(name("greatest-gigabytes"), key(GLOSSY), greatest / GIGA, "GB"),
+        figure("greatest-over-least", greatest(pairs), 1.0, ""),
+        figure("greatest-gigabytes", greatest_bytes, GIGA, "GB"),
     ];
-    change.into_iter().chain(others).collect()
+    change.map(|change| figure("last-over-first", change, 1.0, "")).into_iter().chain(others).collect()
+}
+
+/// Bytes of the photon map that a tile fetches from DRAM.
+pub(super) fn bytes(tile: &TileMeasurement) -> f64 {
+    tile.photon_map().dram_bytes as f64
+}
+
+/// Bytes of the photon map of each tile, summed over measurements of the same tiles, and the tiles' weights.
+pub(super) fn sums_by_tile(measured: &[&Measurement]) -> Vec<(f64, usize)> {
+    let Some(first) = measured.first() else { return Vec::new() };
+    let sum = |index: usize| measured.iter().map(|measured| bytes(&measured.tiles[index])).sum();
+    first.tiles.iter().enumerate().map(|(index, tile)| (sum(index), tile.stands_for)).collect()
 }
 
 /// Ratio of the maximum of a curve to its minimum.

@@ -7,12 +7,12 @@ use photoncard_cards::scheduler::GatherOrder::{DirectionBins, Hash, Sort, Tiled}
 use photoncard_picture::choice::Choice;
 use photoncard_render::Sampling;
 
-use self::line::{LINES, Line, change, curve, exponents, line_name, point, spread};
+use self::line::{LINES, Line, bytes, change, curve, exponents, line_name, point, spread, sums_by_tile};
 use super::super::laboratory::Results;
-use super::super::measure::{Measurement, TileMeasurement};
+use super::super::measure::Measurement;
 use super::super::point::Point;
 use super::super::report::{Figure, Panel, Report, Table, XScale, YScale, slug};
-use super::super::sample::Estimate;
+use super::super::sample::{Estimate, Ratio, product_of_ratios};
 use super::super::scale::Scale;
 use super::present::{
     GIGA, GLOSSY, columns, gigabyte_point, gigabytes, how_it_counts, key, page, panel, plot, say, section,
@@ -76,24 +76,34 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     Report { figures, ..page("Figure 6.17: a glossy floor", introduction, sections) }
 }
 
+/// Measurements of a line at each exponent.
+fn measured<'a>(scale: &Scale, results: &'a Results, line: Line, is_cached: bool) -> Vec<&'a Measurement> {
+    let at = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
+    exponents(scale).into_iter().map(at).collect()
+}
+
 /// Figure of what the order `hash` saves, compared with `tiled`, over what the greatest exponent saves of the
 /// order `tiled`, compared with the least.
 fn reordering_over_exponent(scale: &Scale, results: &Results) -> Figure {
     let [tiled, hash] =
-        [Tiled, Hash].map(|order| curve(scale, results, (order, Sampling::Reflection), false));
-    let sum = |curve: &[Estimate]| curve.iter().map(|estimate| estimate.value).sum::<f64>();
-    let value = sum(&tiled) / sum(&hash) * change(&tiled);
-    Figure::new("figure-6.17.reordering-over-exponent", key(GLOSSY), value, "times")
+        [Tiled, Hash].map(|order| measured(scale, results, (order, Sampling::Reflection), false));
+    let (first, last) = (&tiled[0].tiles, &tiled[tiled.len() - 1].tiles);
+    let ends = last.iter().map(bytes).zip(first.iter().map(bytes));
+    let sums = sums_by_tile(&tiled).into_iter().zip(sums_by_tile(&hash));
+    let of_tile = |((last, first), ((tiled, weight), (hash, _)))| ([tiled, hash, last, first], weight);
+    let sample: Vec<_> = ends.zip(sums).map(of_tile).collect();
+    let Ratio { value, lower, upper } = product_of_ratios(&sample);
+    Figure::new("figure-6.17.reordering-over-exponent", key(GLOSSY), value, "times").within(lower, upper)
 }
 
 /// Key figures of a line in one of the panels.
 fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Vec<Figure> {
     let panel = if is_cached { "with-cache" } else { "without-cache" };
     let name = |quantity: &str| format!("figure-6.17.{quantity}.{panel}.{}", slug(&line_name(line)));
-    let at = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
-    let measured: Vec<_> = exponents(scale).into_iter().map(at).collect();
-    let sum: f64 = measured.iter().map(|measured| measured.photon_map_bytes().value).sum();
-    let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), sum / measured.len() as f64 / GIGA, "GB");
+    let measured = measured(scale, results, line, is_cached);
+    let sum = Estimate::of_total(&sums_by_tile(&measured));
+    let Ratio { value, lower, upper } = sum.scaled(1.0 / measured.len() as f64 / GIGA).with_ends();
+    let mean = Figure::new(name("mean-gigabytes"), key(GLOSSY), value, "GB").within(lower, upper);
     line::figures(&measured, name).into_iter().chain([mean]).collect()
 }
 
@@ -147,7 +157,6 @@ fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estima
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);
     let (first, last) = (of(exponents[0]), of(exponents[exponents.len() - 1]));
-    let bytes = |tile: &TileMeasurement| tile.photon_map().dram_bytes as f64;
     let pairs = first.tiles.iter().zip(&last.tiles);
     let differences: Vec<_> =
         pairs.map(|(first, last)| (bytes(first) - bytes(last), first.stands_for)).collect();

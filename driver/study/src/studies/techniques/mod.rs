@@ -282,11 +282,12 @@ fn factor_figure(name: &str, scene: &str, factor: Option<Ratio>) -> Figure {
 
 fn figures(measured: &Measured) -> Vec<Figure> {
     let Measured { scale, scene, .. } = *measured;
-    let naive = measured.quality(&NAIVE, scale.gather_rays);
+    let error = measured.naive_error();
+    let noise = measured.quality(&NAIVE, scale.gather_rays).reference_noise();
     let figure =
         |name: &str, value: f64, unit| Figure::new(format!("techniques.{name}"), key(scene), value, unit);
-    let mut figures =
-        vec![figure("rmse", naive.rmse(), ""), figure("reference-noise", naive.reference_noise(), "")];
+    let rmse = figure("rmse", error.value, "").within(error.lower, error.upper);
+    let mut figures = vec![rmse, figure("reference-noise", noise, "")];
     for technique in techniques() {
         let slug = slug(technique.name);
         let bytes = measured.traffic(technique, scale.gather_rays).dram_bytes().scaled(1.0 / GIGA);

@@ -24,7 +24,7 @@ pub(super) struct Technique {
 }
 
 /// Maximum number of gather rays at which bytes are measured.
-pub(super) const MAX_TRAFFIC_RAYS: u32 = 200;
+pub(super) const MAX_TRAFFIC_RAYS: u32 = 100;
 pub(super) const NAIVE: Technique = Technique {
     name: "naive",
     order: GatherOrder::Naive,
@@ -72,13 +72,8 @@ pub(super) const ALL_IN_CARD_MEMORY: Technique = Technique {
     ..ALL_IN_LINES
 };
 /// All techniques with gathers in card memory, by ascending error bound of the irradiance cache.
-pub(super) const BY_CACHE_ERROR: [Technique; 4] = [
+pub(super) const BY_CACHE_ERROR: [Technique; 3] = [
     ALL_IN_CARD_MEMORY,
-    Technique {
-        name: "all techniques, lines, gathers in card memory, cache error 0.05",
-        irradiance_error: Some(0.05),
-        ..ALL_IN_CARD_MEMORY
-    },
     Technique {
         name: "all techniques, lines, gathers in card memory, cache error 0.1",
         irradiance_error: Some(0.1),
@@ -167,21 +162,18 @@ impl Technique {
             return vec![scale.gather_rays];
         }
         if self.irradiance_error.is_none() && self.radiance == NAIVE.radiance {
-            return with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 25, 50, 100]));
+            return with_equal_rays(scale, scale.pick(&[50, 100, 200], &[12, 25, 50, 100]));
         }
-        with_equal_rays(scale, scale.pick(&[6, 12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
+        with_equal_rays(scale, scale.pick(&[12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
     }
 
-    /// Numbers of gather rays at which the technique's bytes are measured, ascending. Beyond
-    /// [`MAX_TRAFFIC_RAYS`] the curve of the bytes is nearly straight. Techniques measured with tiles in
-    /// flight, on whole frames, have fewer numbers.
+    /// Numbers of gather rays at which the technique's bytes are measured, ascending. The logarithm of the
+    /// bytes is nearly linear in that of the rays, within these numbers and beyond.
     pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
-        let mut rays = match self.in_flight {
-            Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100], &[12, 50])),
-            None => self.sweep(scale),
-        };
-        rays.retain(|rays| *rays <= MAX_TRAFFIC_RAYS);
-        rays
+        if !self.changes_pixels() {
+            return vec![scale.gather_rays];
+        }
+        with_equal_rays(scale, scale.pick(&[50, MAX_TRAFFIC_RAYS], &[12, 50]))
     }
 }
 

@@ -117,6 +117,14 @@ impl Measured<'_> {
         Quality::pooled(points.iter().map(|point| self.results.quality(point)))
     }
 
+    /// Error of the naive render, with its interval by the jackknife over the tiles that are compared.
+    pub(super) fn naive_error(&self) -> Ratio {
+        let quality = self.quality(&NAIVE, self.scale.gather_rays);
+        let without = (0..quality.tiles.len()).map(|tile| quality.without(tile).rmse());
+        let half_width = jackknife_half_width(&without.collect::<Vec<_>>());
+        Estimate { value: quality.rmse(), half_width }.with_ends()
+    }
+
     /// Ratio of the naive render's bytes to those of a technique at equal rays.
     pub(super) fn factor_at_equal_rays(&self, technique: &Technique) -> Ratio {
         if technique.name == NAIVE.name {
