@@ -106,7 +106,8 @@ class Card(Frames):
         if self.size is None:
             raise Fault(ORDER)
         self.frame_size = command.number(), command.number()
-        command.at += 12 * 4  # the camera
+        command.at += 14 * 4  # the camera's vectors and shift
+        command.at += (0, 7, 0, 2)[command.below(4)] * 4  # its projection
         _seed, _first, self.samples = command.number(), command.number(), command.number()
         self.send(b"\3")
 

@@ -85,13 +85,13 @@ def f32(value):
 def frame_of(head, side):
     """Parameters of a frame of the prepared scene: its first camera, a square picture, and the box filter."""
     camera, photons, integrator = head["cameras"][0], head["photons"], head["integrator"]
-    half = f32(math.tan(f32(0.5 * f32(camera["vertical_fov"]))))
+    half = f32(math.tan(f32(0.5 * f32(camera["projection"]["vertical_fov"]))))
     right, up = ([f32(f32(axis) * half) for axis in camera[name]] for name in ("right", "up"))
     samples, caustics = integrator["samples"], head["caustics"]
     error, threshold = integrator["irradiance_error"], integrator["adaptive_threshold"]
     parts = [
         number(side) * 2,
-        floats(*camera["origin"], *camera["forward"], *right, *up),
+        floats(*camera["origin"], *camera["forward"], *right, *up, 0, 0) + number(0),  # a pinhole, unshifted
         number(integrator["seed"]) + number(0) + number(samples),
         number(integrator["planned_samples"] or samples),
         *(number(integrator[name]) for name in ("gather_rays", "shadow_rays")),

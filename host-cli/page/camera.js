@@ -61,7 +61,7 @@ function shown({ fov, height, angles }, depth) {
     return angles ? radians(angles[1]) * depth : 2 * Math.tan(radians(fov) / 2) * depth;
 }
 
-// Shift by a drag of pixels, so that what is `depth` metres away follows the pointer.
+// Shift by a drag of pixels, so that what is `depth` metres away follows the pointer. A panorama is shifted along the middle's axes.
 export function panned(camera, [dx, dy], height, depth) {
     const { right, up } = axes(camera);
     const metres = shown(camera, depth) / height;
@@ -146,6 +146,7 @@ export function pose(camera) {
     const { position, look_at } = rounded(camera);
     const { fov, height, angles } = extent(camera, shortest);
     const place = point => point.map(shortest).join(",");
-    return `--camera-at ${place(position)} --look-at ${place(look_at)} `
+    const name = camera.name === undefined ? "" : `--camera '${camera.name.replaceAll("'", "'\\\'\'")}' `;
+    return `${name}--camera-at ${place(position)} --look-at ${place(look_at)} `
         + (height ? `--orthographic ${height}` : angles ? `--panorama ${angles.join(",")}` : `--fov ${fov}`);
 }

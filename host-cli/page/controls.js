@@ -93,7 +93,7 @@ export class Controls {
     }
 
     #pan(camera, shift, centre) {
-        return panned(camera, shift, this.canvas.getBoundingClientRect().height, depth(camera, centre));
+        return panned(camera, shift, this.canvas.getBoundingClientRect().height, camera.angles ? length(sub(centre, camera.position)) : depth(camera, centre));
     }
 
     #up(event) {

@@ -82,9 +82,9 @@ pub enum SectionKind {
     IrradianceNodes = 17,
     /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in place of photons.
     IrradianceLeaves = 18,
-    /// Identities of the triangles, `u32` values: [`LEAF_TRIANGLES`](crate::layout::LEAF_TRIANGLES) for each [`crate::layout::BvhLeaf`], one
-    /// for each triangle by slot. Those of triangles in a group are relative to the first value of the
-    /// [`crate::layout::Instance`]. Empty unless a frame asks for identities.
+    /// Identities of the triangles, `u32` values: [`LEAF_TRIANGLES`](crate::layout::LEAF_TRIANGLES) for each
+    /// [`crate::layout::BvhLeaf`], one for each triangle by slot. Those of triangles in a group are relative
+    /// to the first value of the [`crate::layout::Instance`]. Empty unless a frame asks for identities.
     Identities = 19,
 }
 

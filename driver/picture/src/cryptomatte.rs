@@ -4,8 +4,8 @@
 //!
 //! The identifier of a name is its `MurmurHash3` with 32 bits, taken as a single-precision number. Each pixel
 //! has a list of identifiers with their coverage, in the order of decreasing coverage. Channels hold the
-//! list: `CryptoObject00.r` and `.g` are its first identifier and coverage, `.b` and `.a` its second ones, and
-//! so on. Attributes of the file contain a manifest, JSON of the identifiers of all names.
+//! list: `CryptoObject00.r` and `.g` are its first identifier and coverage, `.b` and `.a` its second ones,
+//! and so on. Attributes of the file contain a manifest, JSON of the identifiers of all names.
 //!
 //! The hash is written here, because it is short, and crates of hashes have many others.
 
@@ -149,10 +149,12 @@ impl Matte {
 pub(crate) const PREFIX: &str = "cryptomatte/";
 
 /// Identifiers of a pixel's names and their coverage, the greatest coverage first. Of equal coverages, the
-/// lesser identifier comes first. The coverages of all identities add up to the pixel's alpha.
+/// lesser identifier comes first. The coverages add up to the pixel's alpha, or to less if the pixel has seen
+/// more identities than it keeps.
 fn ranked(sums: &PixelSums, identifiers: &[u32], count: SampleCount) -> [[f32; 2]; MAX_IDENTITIES] {
     let identities = sums.identities.unwrap_or_default();
-    let total = f64::from(sums.coverage.unwrap_or_else(|| identities.total()));
+    // A damaged file may state more identities than coverage.
+    let total = f64::from(sums.coverage.unwrap_or_default().max(identities.total()).max(1));
     let alpha = f64::from(sums.alpha(count));
     let mut covered: Vec<(u32, u32)> = Vec::with_capacity(MAX_IDENTITIES);
     for (identity, coverage) in identities.iter() {

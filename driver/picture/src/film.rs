@@ -183,8 +183,8 @@ impl Film {
         self.origin
     }
 
-    /// Sets the position of the scene's origin in the coordinates of its file, metres. Positions of pixels are
-    /// in these coordinates.
+    /// Sets the position of the scene's origin in the coordinates of its file, metres. Positions of pixels
+    /// are in these coordinates.
     pub fn set_origin(&mut self, origin: [f64; 3]) {
         self.origin = origin;
     }

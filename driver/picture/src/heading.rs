@@ -6,8 +6,8 @@ use photoncard_shared::checksum::checksum;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Maximum length of the JSON, bytes.
-const MAX_HEAD: u64 = 1 << 24;
+/// Maximum length of the JSON, bytes. The names of a large scene's objects take some 70 bytes each.
+const MAX_HEAD: u64 = 1 << 30;
 
 /// Kind and version of a file.
 #[derive(Clone, Copy, Debug)]

@@ -9,8 +9,8 @@
 //! - [`allocation`]: checks that memory can be allocated; [`foreign`]: isolation of decoders that may panic.
 //! - [`sums`]: format of pixels' sums, and their values; [`sink`] and [`viewer`]: traits of destinations of
 //!   tiles, and of viewers.
-//! - [`film`]: pixels of a picture; [`layer`]: its layers; [`cryptomatte`]: mattes; [`exr`] and [`tone_mapping`]: picture files;
-//!   [`difference`]: comparison of pictures.
+//! - [`film`]: pixels of a picture; [`layer`]: its layers; [`cryptomatte`]: mattes; [`exr`] and
+//!   [`tone_mapping`]: picture files; [`difference`]: comparison of pictures.
 //!
 //! This is the lowest crate of the host. Scenes read environments through [`exr`], and all crates write files
 //! through [`output`].

@@ -17,10 +17,12 @@ pub struct FinishedTile {
 }
 
 impl FinishedTile {
-    /// Creates a tile from encoded sums; `None` unless there is one record for each pixel.
+    /// Creates a tile from encoded sums; `None` unless there is one valid record for each pixel.
     pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
-        (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
+        let mut all = records.chunks_exact(format.record_bytes());
+        let are_valid = records.len() as u64 == bytes && all.all(|record| PixelSums::read(record).is_some());
+        are_valid.then_some(Self { tile, records, format, counters })
     }
 
     /// Creates a tile from the sums of its pixels, row by row, with zero counters; `None` unless each pixel

@@ -34,8 +34,8 @@ pub struct FilmPixel {
     pub layers: PixelLayers,
     /// Fraction of the pixel that surfaces cover, 0 to 1.
     pub alpha: f32,
-    /// Mean position of the surfaces that the samples see, metres; zero if none is seen, and in a film without
-    /// positions.
+    /// Mean position of the surfaces that the samples see, metres; zero if none is seen, and in a film
+    /// without positions.
     pub position: [f32; 3],
 }
 
@@ -103,8 +103,8 @@ impl SumFormat {
         if self.form.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }
     }
 
-    /// Format of sums over the samples of this format and of `more`; `None` if units or contents differ, or the
-    /// number of samples overflows.
+    /// Format of sums over the samples of this format and of `more`; `None` if units or contents differ, or
+    /// the number of samples overflows.
     pub fn plus(&self, more: &Self) -> Option<Self> {
         let is_alike = self.form == more.form && self.scale == more.scale;
         let samples = self.samples.checked_add(more.samples)?;

@@ -1,6 +1,7 @@
 //! Cameras: perspective, with a thin lens, orthographic, and panoramas.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use glam::Vec3;
@@ -94,6 +95,15 @@ impl fmt::Display for Aperture {
     }
 }
 
+/// Possible distances of the plane in focus, metres.
+const FOCUS: RangeInclusive<f32> = 1e-6..=1e9;
+/// Maximum diameter of a lens, metres.
+const WIDEST: f32 = 1e6;
+/// Maximum lens shift, in units of the picture's longer side.
+const FARTHEST_SHIFT: f32 = 1e6;
+/// Heights of an orthographic picture that are possible, metres.
+const HEIGHTS: RangeInclusive<f32> = 1e-9..=1e12;
+
 /// Longer side of the sensor to which f-numbers refer, metres: 36 mm, as in Blender.
 const SENSOR: f32 = 0.036;
 
@@ -123,11 +133,10 @@ impl Projection {
     /// # Errors
     /// The reason why the height is not possible.
     pub fn orthographic(height: f32) -> Result<Self, String> {
-        let half_height = 0.5 * height;
-        if half_height.is_normal() && half_height > 0.0 {
-            return Ok(Self::Orthographic { half_height });
+        if HEIGHTS.contains(&height) {
+            return Ok(Self::Orthographic { half_height: 0.5 * height });
         }
-        Err("the height of an orthographic picture is above 0 metres".into())
+        Err("the height of an orthographic picture is above 0 metres, up to 1e12".into())
     }
 
     /// Name of the projection in texts and JSON.
@@ -167,8 +176,8 @@ impl Camera {
     /// # Errors
     /// The reason, if the numbers are not finite, or the camera is a panorama, which has no plane to shift.
     pub fn set_shift(&mut self, shift: [f32; 2]) -> Result<(), String> {
-        if !shift.iter().all(|number| number.is_finite()) {
-            return Err("a lens shift is two finite numbers".into());
+        if !shift.iter().all(|number| number.abs() <= FARTHEST_SHIFT) {
+            return Err("a lens shift is two finite numbers, up to 1e6".into());
         }
         if shift != [0.0; 2] && matches!(self.projection, Projection::Panorama { .. }) {
             return Err("a panorama has no lens shift".into());
@@ -182,15 +191,17 @@ impl Camera {
     /// # Errors
     /// The reason, if the camera is not perspective, or the numbers are not possible.
     pub fn set_lens(&mut self, aperture: Aperture, focus: f32, aspect: f32) -> Result<(), String> {
-        if !(focus.is_normal() && focus > 0.0) {
-            return Err(format!("a focus of {focus} m is not possible: it is a distance above 0"));
+        if !FOCUS.contains(&focus) {
+            return Err(format!("a focus of {focus} m is not possible: it is from 1e-6 to 1e9 m"));
         }
         let diameter = self.diameter(aperture, aspect);
         let diameter = diameter.ok_or("only a perspective camera has an aperture")?;
-        if !(0.0..f32::INFINITY).contains(&diameter) {
-            return Err(format!("an aperture of {aperture} is not possible"));
+        if diameter > WIDEST {
+            return Err(format!("an aperture of {diameter} m is not possible: it is up to 1e6 m"));
         }
-        self.lens = (diameter > 0.0).then_some(Lens { radius: 0.5 * diameter, focus });
+        let radius = 0.5 * diameter;
+        // A lens without extent is a pinhole.
+        self.lens = radius.is_normal().then_some(Lens { radius, focus });
         Ok(())
     }
 

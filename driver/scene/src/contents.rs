@@ -32,8 +32,8 @@ pub struct SceneContents {
     pub tangents: Vec<CornerTangents>,
     /// Materials; the index in [`Triangle::material`] refers to this list.
     pub materials: Vec<Material>,
-    /// Names of the objects: of the file's nodes that show triangles. A picture without layers of objects does
-    /// not depend on them.
+    /// Names of the objects: of the file's nodes that show triangles. A picture without layers of objects
+    /// does not depend on them.
     pub objects: Vec<String>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
     pub textures: Vec<Texture>,

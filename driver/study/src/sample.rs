@@ -176,9 +176,9 @@ pub(super) fn ratio_of_sums(sample: &[(f64, f64, usize)]) -> Ratio {
     Ratio { value, lower: value - half_width, upper: value + half_width }
 }
 
-/// Product of the ratios `a / b` and `c / d` of sums over the same members. Each element has `[a, b, c, d]` of
-/// a member and its weight. The interval is that of the first-order change of the product's logarithm by each
-/// member, so that what varies alike in several sums cancels.
+/// Product of the ratios `a / b` and `c / d` of sums over the same members. Each element has `[a, b, c, d]`
+/// of a member and its weight. The interval is that of the first-order change of the product's logarithm by
+/// each member, so that what varies alike in several sums cancels.
 pub(super) fn product_of_ratios(sample: &[([f64; 4], usize)]) -> Ratio {
     let sum = |index: usize| sample.iter().map(|(values, weight)| values[index] * *weight as f64).sum();
     let sums: [f64; 4] = [0, 1, 2, 3].map(sum);

@@ -209,8 +209,8 @@ impl Scale {
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
-    /// Point that measures the memory traffic on chips of kind `chip` with `caches`: of a sample of the tiles,
-    /// or of all if gathers of several tiles wait at once, on one chip.
+    /// Point that measures the memory traffic on chips of kind `chip` with `caches`: of a sample of the
+    /// tiles, or of all if gathers of several tiles wait at once, on one chip.
     pub(super) fn on_chip(
         &self,
         scene: &str,

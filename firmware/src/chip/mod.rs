@@ -34,7 +34,7 @@ mod records;
 mod rounds;
 mod stored_point;
 #[cfg(test)]
-mod test_frame;
+pub(crate) mod test_frame;
 #[cfg(test)]
 mod tests;
 

@@ -28,7 +28,7 @@ use crate::sampler::hash;
 
 const DIRECTORY_LINES: u32 = 128;
 /// Upper bound of the length of a frame's encoded parameters, bytes.
-const KEY_BYTES: usize = 128;
+const KEY_BYTES: usize = 192;
 
 /// Encoded parameters of a frame, with constants in place of the parameters that no record depends on. Floats
 /// are compared by their bits.
@@ -218,9 +218,49 @@ fn key(frame: &FrameParameters) -> Option<Key> {
         queue: 1,
         in_flight: 1,
         adaptive_threshold: None,
+        transparent: false,
+        position: false,
+        coverage: false,
+        identities: false,
         ..*frame
     };
     let mut key = [0; KEY_BYTES];
     frame.keep_records.then(|| message::encode(&of_records, &mut key)).flatten()?;
     Some(key)
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::message::{Camera, CausticGather, Projection};
+
+    use super::*;
+    use crate::chip::test_frame::frame;
+
+    #[test]
+    fn the_longest_frame_has_a_key() {
+        let axis = [f32::MAX; 3];
+        let projection = Projection::ThinLens { right: axis, up: axis, focus: 1.0 };
+        let longest = FrameParameters {
+            width: u32::MAX,
+            height: u32::MAX,
+            camera: Camera { projection, ..Camera::pinhole(axis, axis, axis, axis) },
+            seed: u32::MAX,
+            planned_samples: u32::MAX,
+            gather_rays: u32::MAX,
+            shadow_rays: u32::MAX,
+            neighbors: u32::MAX,
+            irradiance_error: Some(1.0),
+            caustics: Some(CausticGather { neighbors: u32::MAX, max_distance: 1.0 }),
+            keep_records: true,
+            ..frame()
+        };
+        assert!(key(&longest).is_some());
+        let wide = |change: &dyn Fn(&mut FrameParameters)| {
+            let mut changed = longest;
+            change(&mut changed);
+            key(&changed) == key(&longest)
+        };
+        assert!(wide(&|frame| frame.transparent = !frame.transparent));
+        assert!(!wide(&|frame| frame.camera.shift[0] += 1.0));
+    }
 }

@@ -67,7 +67,8 @@ pub enum Sight {
     /// The environment.
     Background {
         /// Radiance, W/(sr m^2), times the throughput of the eye path. It is zero without an environment, for
-        /// a path that contributes nothing, and in a transparent frame if the eye ray itself leaves the scene.
+        /// a path that contributes nothing, and in a transparent frame if the eye ray itself leaves the
+        /// scene.
         radiance: Vec3,
         /// [Depth](camera::depth) of the eye ray's hit, metres, and the hit; `None` if the ray itself leaves
         /// the scene.

@@ -41,7 +41,7 @@ pub fn ray_at(camera: &Camera, [u, v]: [f32; 2], lens: [f32; 2]) -> Ray {
         Projection::ThinLens { right, up, focus } => {
             let [across, along] = lens;
             let offset = Vec3::from_array(right) * across + Vec3::from_array(up) * along;
-            Ray::new(origin + offset, unit(plane() * focus - offset))
+            Ray::new(origin + offset, unit(plane() - offset * (1.0 / focus)))
         }
         Projection::Orthographic => Ray::new(origin + right * x + up * y, unit(forward)),
         Projection::Panorama { angles: [longitude, latitude] } => {

@@ -22,8 +22,9 @@ pub(super) struct Video {
 /// Replaces each video among the outputs by the PNG pictures that it is encoded from, and returns the videos.
 ///
 /// # Errors
-/// If no frames are stated; if the pictures are to have alpha; if a video's name contains `#`, or is that of an input; if a file that photoncard
-/// did not write has the name of one of the PNG pictures; or if ffmpeg cannot be started.
+/// If no frames are stated; if the pictures are to have alpha; if a video's name contains `#`, or is that of
+/// an input; if a file that photoncard did not write has the name of one of the PNG pictures; or if ffmpeg
+/// cannot be started.
 pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let mut videos = Vec::new();
     for output in options.outputs.pictures.iter_mut().filter(|output| output.format == PictureFormat::Video) {

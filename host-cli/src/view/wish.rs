@@ -51,12 +51,22 @@ impl Wish {
         let View { camera, position, look_at, shown } = view;
         let picture = &mut self.settings.picture;
         (picture.camera_at, picture.look_at) = (Some(position), Some(look_at));
-        picture.camera = camera.or(picture.camera.take());
+        if camera.is_some() {
+            // A chosen camera has its own lens and shift.
+            (picture.camera, picture.aperture, picture.focus, picture.shift) = (camera, None, None, None);
+        }
         (picture.fov, picture.orthographic, picture.panorama) = match shown {
             Extent::Fov(degrees) => (Some(degrees), None, None),
             Extent::Height(metres) => (None, Some(metres), None),
             Extent::Angles(degrees) => (None, None, Some(degrees)),
         };
+        // What a projection cannot have does not survive the change to it.
+        if !matches!(shown, Extent::Fov(_)) {
+            (picture.aperture, picture.focus) = (None, None);
+        }
+        if matches!(shown, Extent::Angles(_)) {
+            picture.shift = None;
+        }
     }
 
     /// Sets a property. If it was set before, the new value replaces the earlier value at the same position

@@ -181,10 +181,14 @@ fn cameras_refuse_what_their_projection_lacks() {
     for (options, words) in [
         ([around, ["--shift", "0.1,0"]].concat(), ["--shift", "no lens shift"]),
         ([around, ["--aperture", "0.1"]].concat(), ["--aperture", "in focus"]),
-        ([["--aperture", "0.1"], ["--focus", "-1"]].concat(), ["above 0", "f/2.8"]),
+        ([["--aperture", "0.1"], ["--focus", "-1"]].concat(), ["--focus", "from 1e-6 to 1e9"]),
+        ([["--aperture", "0.1"], ["--focus", "1e20"]].concat(), ["--focus", "from 1e-6 to 1e9"]),
+        ([["--aperture", "1e7"], ["--focus", "1"]].concat(), ["--aperture", "up to 1e6"]),
+        ([["--shift", "3e38,0"], ["--fov", "40"]].concat(), ["--shift", "up to 1e6"]),
+        ([["--orthographic", "3e38"], ["--spp", "1"]].concat(), ["--orthographic", "up to 1e12"]),
         (
             [["--aperture", "0.1"], ["--focus", "1"], ["--orthographic", "2"]].concat(),
-            ["perspective", "f/2.8"],
+            ["--aperture", "perspective"],
         ),
         ([["--fov", "40"], ["--orthographic", "2"]].concat(), ["--fov", "cannot be used with"]),
         ([around, ["--orthographic", "2"]].concat(), ["--panorama", "cannot be used with"]),

@@ -459,8 +459,8 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Answer to [`Command::BeginFrame`]: the card can render the frame.
     FrameAccepted,
-    /// Consecutive pixels of a tile in row-major order, [`PixelForm::record_bytes`] each. A tile takes several replies,
-    /// in any order. Every pixel is sent once.
+    /// Consecutive pixels of a tile in row-major order, [`PixelForm::record_bytes`] each. A tile takes
+    /// several replies, in any order. Every pixel is sent once.
     Pixels {
         /// Number of the tile.
         tile: u32,

@@ -40,7 +40,9 @@ def main():
     parser.add_argument("--folder", type=Path, required=True, help="where files go")
     parser.add_argument("--seeds", type=int, default=4, help="pictures of photoncard [default: 4]")
     parser.add_argument("--passes", type=int, default=16, help=f"of {SAMPLES} samples of a reference [default: 16]")
-    arguments, options = parser.parse_known_args()
+    words = sys.argv[1:]
+    place = words.index("--") if "--" in words else len(words)
+    arguments, options = parser.parse_args(words[:place]), words[place + 1 :]
     print("| room | camera | mean | median | 95th percentile | most | noise |\n|---|---|---|---|---|---|---|", flush=True)
     for name in arguments.names or ["living-room"]:
         room = convert(arguments, name)
@@ -75,11 +77,11 @@ def cameras(path, passes):
 
     yield "pinhole", size, by(sensor)
     longer = max(width, height)
-    # Mitsuba moves the principal point to the left and to the top, in parts of the film's sides.
+    # Mitsuba's offset is to the right and to the bottom, in parts of the film's sides.
     shifted = {
         **sensor,
-        "principal_point_offset_x": -SHIFT[0] * longer / width,
-        "principal_point_offset_y": SHIFT[1] * longer / height,
+        "principal_point_offset_x": SHIFT[0] * longer / width,
+        "principal_point_offset_y": -SHIFT[1] * longer / height,
     }
     yield "lens shift", [*size, "--shift", f"{SHIFT[0]},{SHIFT[1]}"], by(shifted)
     radius, focus = 0.5 * APERTURE * distance, FOCUS * distance

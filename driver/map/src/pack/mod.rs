@@ -67,8 +67,8 @@ impl PackedScene {
         Self::of_content(scene, false)
     }
 
-    /// Packs the scene as [`Self::new`] does, with the identities of its triangles: numbers of pairs of object
-    /// and material.
+    /// Packs the scene as [`Self::new`] does, with the identities of its triangles: numbers of pairs of
+    /// object and material.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -157,10 +157,12 @@ fn read_tile(
     if checksum(file, bytes) != sum {
         return Ok(None);
     }
+    let records = bytes[HEAD_BYTES..].chunks_exact(pixel_bytes);
+    let Some(all) = records.map(PixelSums::read).collect::<Option<Vec<_>>>() else { return Ok(None) };
     if let Some(film) = kept.film_of(samples) {
-        for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
-            // Writing cannot fail: the tile lies inside the window, and records have their full length.
-            let _ = PixelSums::read(record).map(|sums| film.write(x, y, &sums));
+        for ((x, y), sums) in pixel_positions(&tile).zip(&all) {
+            // Writing cannot fail: the tile lies inside the window.
+            let _ = film.write(x, y, sums);
         }
     }
     Ok(Some(behind_magic))

@@ -34,7 +34,11 @@ impl RenderSettings {
         }
         self.picture.project(&mut camera)?;
         self.picture.focus(&mut camera, distance)?;
-        Ok(camera)
+        if self.frame_camera(&camera).is_finite() {
+            return Ok(camera);
+        }
+        let reason = "its numbers are too large for single precision".into();
+        Err(refused("picture.camera", &camera.name, reason, "give a smaller size, shift or field of view"))
     }
 }
 
@@ -92,34 +96,36 @@ impl Picture {
     /// Sets the stated lens. `distance` is that of [`Self::look_at`], metres.
     fn focus(&self, camera: &mut Camera, distance: Option<f32>) -> Result<(), RenderError> {
         let Self { aperture, focus, width, height, .. } = *self;
+        if aperture == Some(Aperture::Diameter(0.0)) {
+            camera.lens = None;
+            return Ok(());
+        }
         let own = camera.lens;
-        let Some(aperture) = aperture.or(own.map(|lens| Aperture::Diameter(2.0 * lens.radius))) else {
-            return match focus {
-                None => Ok(()),
-                Some(focus) => {
-                    let reason = "a pinhole is in focus everywhere".into();
-                    Err(refused("picture.focus", &focus, reason, "give an aperture too, such as f/2.8"))
-                }
-            };
+        let Some(opening) = aperture.or(own.map(|lens| Aperture::Diameter(2.0 * lens.radius))) else {
+            let reason = || "a pinhole is in focus everywhere".into();
+            let remedy = "give an aperture too, such as f/2.8";
+            return focus.map_or(Ok(()), |focus| Err(refused("picture.focus", &focus, reason(), remedy)));
         };
-        let Some(focus) = focus.or(own.map(|lens| lens.focus)).or(distance) else {
+        let Some(distance) = focus.or(own.map(|lens| lens.focus)).or(distance) else {
             let reason = "a lens needs a distance in focus".into();
             return Err(refused(
                 "picture.aperture",
-                &aperture,
+                &opening,
                 reason,
                 "give the focus in metres, such as 2.5",
             ));
         };
-        let aspect = width as f32 / height as f32;
-        camera.set_lens(aperture, focus, aspect).map_err(|reason| {
-            let field = if self.aperture.is_some() { "picture.aperture" } else { "picture.focus" };
-            refused(
-                field,
-                &aperture,
+        let set = camera.set_lens(opening, distance, width as f32 / height as f32);
+        set.map_err(|reason| match focus {
+            Some(focus) if camera.vertical_fov().is_some() && reason.contains("focus") => {
+                refused("picture.focus", &focus, reason, "give metres, such as 2.5")
+            }
+            _ => refused(
+                "picture.aperture",
+                &opening,
                 reason,
-                "give a perspective camera, an aperture such as f/2.8, and a focus in metres",
-            )
+                "give one such as f/2.8, of a perspective camera",
+            ),
         })
     }
 }

@@ -57,8 +57,8 @@ pub struct Picture {
     pub layers: Layers,
     /// Pixel filter.
     pub filter: Filter,
-    /// True if the environment is black where eye rays see it directly. Files then have alpha, and radiance is
-    /// premultiplied.
+    /// True if the environment is black where eye rays see it directly. Files then have alpha, and radiance
+    /// is premultiplied.
     pub transparent: bool,
 }
 

@@ -1,17 +1,19 @@
 //! Cameras of the file, or a default one that shows the whole scene.
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json::camera::{Orthographic, Type};
 use gltf::json::validation::Checked;
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::document::Document;
 use super::extras;
 use super::inside::{self, Framed};
 use crate::error::SceneError;
-use crate::{Camera, FRAMED, Projection, Scene};
+use crate::{Aperture, Camera, FRAMED, Projection, Scene};
 
 /// Width of the default camera's view, in units of the scene's width or height, whichever is larger.
 const MARGIN: f32 = 1.05;
@@ -22,25 +24,29 @@ const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 /// Vertical field of view of a default camera inside a room: 65 degrees, in radians.
 const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
 
+/// Halves of the extents of an orthographic picture that are possible, metres.
+const EXTENTS: RangeInclusive<f32> = 1e-9..=1e12;
+
 /// Properties of a camera under the key `photoncard` of its `extras`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Extras {
     /// [`Camera::shift`].
     shift: Option<[f32; 2]>,
-    /// Diameter in metres, or an f-number such as `f/2.8`.
-    aperture: Option<Opening>,
+    /// Diameter in metres, or an f-number such as `f/2.8`; of a picture of the file's aspect ratio.
+    aperture: Option<Value>,
     /// [`Lens::focus`], metres.
     focus: Option<f32>,
     /// Angles of longitude and latitude, degrees.
     panorama: Option<[f32; 2]>,
 }
 
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Opening {
-    Diameter(f32),
-    Text(String),
+/// Reads a number of metres, or a text such as `f/2.8`.
+fn aperture_of(value: &Value) -> Result<Aperture, String> {
+    match value {
+        Value::String(text) => text.parse(),
+        other => other.to_string().parse(),
+    }
 }
 
 impl Extras {
@@ -55,13 +61,15 @@ impl Extras {
                 (Projection::panorama(degrees)?, Some(degrees[0] / degrees[1]));
         }
         camera.set_shift(shift.unwrap_or_default())?;
-        let aperture = match aperture {
-            None => return Ok(()),
-            Some(Opening::Diameter(diameter)) => diameter.to_string().parse()?,
-            Some(Opening::Text(text)) => text.parse()?,
-        };
-        let focus = focus.ok_or("an aperture needs a focus")?;
-        camera.set_lens(aperture, focus, camera.aspect.unwrap_or(1.0))
+        match (aperture, focus) {
+            (None, None) => Ok(()),
+            (Some(aperture), Some(focus)) => {
+                let aperture = aperture_of(&aperture)?;
+                camera.set_lens(aperture, focus, camera.aspect.unwrap_or(1.0))
+            }
+            (Some(_), None) => Err("an aperture needs a focus".into()),
+            (None, Some(_)) => Err("a focus needs an aperture".into()),
+        }
     }
 }
 
@@ -114,7 +122,7 @@ impl<'a> CameraPlacer<'a> {
             let [half_width, half_height] = [xmag, ymag].map(|extent| extent.abs());
             let aspect = half_width / half_height;
             for (field, extent, ratio) in [("ymag", half_height, 1.0), ("xmag", half_width, aspect)] {
-                if !(extent.is_normal() && ratio.is_normal()) {
+                if !(EXTENTS.contains(&extent) && ratio.is_normal()) {
                     let reason = format!("half an extent of {extent} m is not possible");
                     return invalid(&format!("orthographic.{field}"), reason, "state metres above 0");
                 }

@@ -303,7 +303,10 @@ fn only_one_of_two_pages_steers() {
     second.send(&camera(0.3, false));
     let states = [first.settle(), second.settle()];
     assert_eq!(states[0], states[1]);
-    assert_eq!(first.pixels, second.pixels);
+    // Squares of coarse passes, which a slow page may miss, extend beyond the picture.
+    for (place, pixel) in first.pixels.iter().filter(|((x, y), _)| *x < 20 && *y < 12) {
+        assert_eq!(second.pixels.get(place), Some(pixel), "{place:?}");
+    }
     drop(second);
     assert_eq!(first.wait_for("steers")["value"], true);
 }

@@ -40,8 +40,10 @@
         for (const other of [parallel, around]) {
             const there = camera.projected(other, centre, size);
             check(near(camera.projected(camera.dollied(other, centre, 0.5), centre, size), there, 1e-6), "a dolly keeps its centre");
+            // The top of a turned panorama stays +y, so that what is beside its middle moves.
+            if (other === around) continue;
             const turned = camera.turned(other, centre, 2 * random() - 1, 0.2 * random() - 0.1);
-            check(near(camera.projected(turned, centre, size), there, 1e-6) || other === around, "an orbit keeps its centre");
+            check(near(camera.projected(turned, centre, size), there, 1e-6), "an orbit keeps its centre");
         }
         const along = camera.panned(parallel, [7, -4], size[1], 1);
         check(near(camera.projected(along, centre, size), camera.add(camera.projected(parallel, centre, size), [7, -4]), 1e-6),
