@@ -107,7 +107,8 @@ class Card(Frames):
             raise Fault(ORDER)
         self.frame_size = command.number(), command.number()
         command.at += 14 * 4  # the camera's vectors and shift
-        command.at += (0, 7, 0, 2)[command.below(4)] * 4  # its projection
+        projection = command.below(4)
+        command.at += (0, 7, 0, 2)[projection] * 4
         _seed, _first, self.samples = command.number(), command.number(), command.number()
         self.send(b"\3")
 
