@@ -153,8 +153,8 @@ pub(crate) const PREFIX: &str = "cryptomatte/";
 /// more identities than it keeps.
 fn ranked(sums: &PixelSums, identifiers: &[u32], count: SampleCount) -> [[f32; 2]; MAX_IDENTITIES] {
     let identities = sums.identities.unwrap_or_default();
-    // A damaged file may state more identities than coverage.
-    let total = f64::from(sums.coverage.unwrap_or_default().max(identities.total()).max(1));
+    // A damaged file may state identities without coverage.
+    let total = f64::from(sums.coverage.unwrap_or_else(|| identities.total()).max(1));
     let alpha = f64::from(sums.alpha(count));
     let mut covered: Vec<(u32, u32)> = Vec::with_capacity(MAX_IDENTITIES);
     for (identity, coverage) in identities.iter() {
