@@ -19,7 +19,7 @@ pub(crate) struct MergeOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
-    /// Type of the EXR's samples; the layers Z and gathers are always float
+    /// Type of the EXR's samples; layers Z, gathers, position and mattes are always float
     #[arg(long, default_value = SampleFormat::Float.name(), value_parser = choice::<SampleFormat>())]
     pub(crate) sample_type: SampleFormat,
     #[command(flatten)]

@@ -31,7 +31,7 @@ pub(crate) struct OutputOptions {
     /// and have these settings are not rendered again.
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Type of the EXR's samples; the layers Z, gathers and position and mattes are always float [default: float]
+    /// Type of the EXR's samples; layers Z, gathers, position and mattes are always float [default: float]
     #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
     sample_type: Option<SampleFormat>,
     #[command(flatten)]
