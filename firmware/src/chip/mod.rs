@@ -34,7 +34,7 @@ mod records;
 mod rounds;
 mod stored_point;
 #[cfg(test)]
-pub(crate) mod test_frame;
+mod test_frame;
 #[cfg(test)]
 mod tests;
 

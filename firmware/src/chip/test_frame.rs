@@ -3,7 +3,7 @@
 use photoncard_shared::message::{Camera, FrameParameters};
 
 /// Frame of 8x8 pixels with one sample per pixel and one ray of each kind.
-pub(crate) fn frame() -> FrameParameters {
+pub(super) fn frame() -> FrameParameters {
     let camera = Camera::pinhole([0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]);
     FrameParameters {
         width: 8,

@@ -231,36 +231,55 @@ fn key(frame: &FrameParameters) -> Option<Key> {
 
 #[cfg(test)]
 mod tests {
-    use photoncard_shared::message::{Camera, CausticGather, Projection};
+    use photoncard_shared::message::{Camera, CausticGather, Filter, Projection, Radiance, Sampling};
 
     use super::*;
-    use crate::chip::test_frame::frame;
 
-    #[test]
-    fn the_longest_frame_has_a_key() {
+    /// Frame whose encoding is as long as any.
+    fn longest() -> FrameParameters {
         let axis = [f32::MAX; 3];
         let projection = Projection::ThinLens { right: axis, up: axis, focus: 1.0 };
-        let longest = FrameParameters {
+        FrameParameters {
             width: u32::MAX,
             height: u32::MAX,
             camera: Camera { projection, ..Camera::pinhole(axis, axis, axis, axis) },
             seed: u32::MAX,
+            first_sample: u32::MAX,
+            samples: u32::MAX,
             planned_samples: u32::MAX,
             gather_rays: u32::MAX,
             shadow_rays: u32::MAX,
             neighbors: u32::MAX,
+            max_distance: 1.0,
+            sampling: Sampling::Mixture,
             irradiance_error: Some(1.0),
+            bins: u32::MAX,
+            drain: Drain::Buckets,
+            queue: u32::MAX,
+            radiance: Radiance::Precomputed,
             caustics: Some(CausticGather { neighbors: u32::MAX, max_distance: 1.0 }),
+            layers: true,
+            filter: Filter::BlackmanHarris,
+            in_flight: u32::MAX,
             keep_records: true,
-            ..frame()
-        };
+            adaptive_threshold: Some(1.0),
+            transparent: true,
+            position: true,
+            coverage: true,
+            identities: true,
+        }
+    }
+
+    #[test]
+    fn the_longest_frame_has_a_key_of_what_records_depend_on() {
+        let longest = longest();
         assert!(key(&longest).is_some());
-        let wide = |change: &dyn Fn(&mut FrameParameters)| {
+        let is_kept = |change: &dyn Fn(&mut FrameParameters)| {
             let mut changed = longest;
             change(&mut changed);
             key(&changed) == key(&longest)
         };
-        assert!(wide(&|frame| frame.transparent = !frame.transparent));
-        assert!(!wide(&|frame| frame.camera.shift[0] += 1.0));
+        assert!(is_kept(&|frame| frame.transparent = false) && is_kept(&|frame| frame.identities = false));
+        assert!(!is_kept(&|frame| frame.camera.shift[0] = 1.0) && !is_kept(&|frame| frame.seed = 1));
     }
 }
