@@ -199,8 +199,8 @@ fn a_setting_is_in_the_identity_of_a_picture_exactly_if_pixels_depend_on_it() {
         assert_eq!(changed.identity(&scene) != settings().identity(&scene), is_of_pixels, "{name}");
         differing += usize::from(is_of_pixels);
     }
-    // Width and height are two fields, and one option.
-    assert_eq!(settings().of_pixels().len(), differing - 1);
+    // Width and height are two fields, and one option. Transparency is stated only where it is on.
+    assert_eq!(settings().of_pixels().len(), differing - 2);
 }
 
 #[test]

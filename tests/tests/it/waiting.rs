@@ -59,7 +59,12 @@ impl World {
             (s.integrator.samples, s.integrator.irradiance_error) = (1, None);
             change(s);
         });
-        let packed = PackedScene::new(&scene).expect("packs");
+        let pack = if settings.picture.layers == Layers::all() {
+            PackedScene::with_identities
+        } else {
+            PackedScene::new
+        };
+        let packed = pack(&scene).expect("packs");
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
         let MappedImage { image, max_distance, caustics, .. } = mapped;
         let camera = settings.camera(&scene).expect("a camera");

@@ -12,8 +12,7 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{Block, Table};
 use super::super::scale::Scale;
-use super::headlines::SCENES;
-use super::present::{GIGA, columns, gigabytes, table, text};
+use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, table, text};
 
 /// A kind of chip, its order and number of tiles in flight, and its caches.
 #[derive(Clone, Copy)]
@@ -32,6 +31,8 @@ const ON_REFERENCE: Setup = Setup {
     in_flight: 1,
     caches: Some(with_scene_cache(REFERENCE.scene_cache_bytes)),
 };
+/// A simple and a large scene: file and name in the report.
+pub(super) const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
 /// The reference chip, whose gathers wait in card memory. Its caches take the memory that each kind of work
 /// leaves free.
 pub(super) const IN_CARD_MEMORY: Setup = Setup { order: GatherOrder::Buckets, caches: None, ..ON_REFERENCE };

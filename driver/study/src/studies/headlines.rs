@@ -10,11 +10,8 @@ use super::super::point::Point;
 use super::super::report::{Block, Figure, Table, slug};
 use super::super::sample::{Estimate, Ratio};
 use super::super::scale::Scale;
-use super::flights::{IN_CARD_MEMORY, LARGE_IN_FLIGHT};
-use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, key, say, table, text};
-
-/// A simple and a large scene: file and name in the report.
-pub(super) const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
+use super::flights::{IN_CARD_MEMORY, LARGE_IN_FLIGHT, SCENES};
+use super::present::{GIGA, columns, gigabytes, key, say, table, text};
 
 /// Bytes per gather in the dissertation's naive order.
 const PUBLISHED_GATHER_BYTES: f64 = 14_000.0;
