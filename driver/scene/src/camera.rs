@@ -101,11 +101,24 @@ const FOCUS: RangeInclusive<f32> = 1e-6..=1e9;
 const WIDEST: f32 = 1e6;
 /// Maximum lens shift, in units of the picture's longer side.
 const FARTHEST_SHIFT: f32 = 1e6;
-/// Heights of an orthographic picture that are possible, metres.
-const HEIGHTS: RangeInclusive<f32> = 1e-9..=1e12;
+/// Possible extents of an orthographic picture, metres.
+pub(crate) const EXTENTS: RangeInclusive<f32> = 1e-9..=1e12;
 
 /// Longer side of the sensor to which f-numbers refer, metres: 36 mm, as in Blender.
 const SENSOR: f32 = 0.036;
+
+impl Lens {
+    /// Checks a distance of the plane in focus, metres.
+    ///
+    /// # Errors
+    /// The reason why the distance is not possible.
+    pub fn check_focus(focus: f32) -> Result<(), String> {
+        if FOCUS.contains(&focus) {
+            return Ok(());
+        }
+        Err(format!("a focus of {focus} m is not possible: it is from 1e-6 to 1e9 m"))
+    }
+}
 
 impl Projection {
     /// Perspective projection with a vertical field of view in radians.
@@ -133,7 +146,7 @@ impl Projection {
     /// # Errors
     /// The reason why the height is not possible.
     pub fn orthographic(height: f32) -> Result<Self, String> {
-        if HEIGHTS.contains(&height) {
+        if EXTENTS.contains(&height) {
             return Ok(Self::Orthographic { half_height: 0.5 * height });
         }
         Err("the height of an orthographic picture is above 0 metres, up to 1e12".into())
@@ -191,9 +204,7 @@ impl Camera {
     /// # Errors
     /// The reason, if the camera is not perspective, or the numbers are not possible.
     pub fn set_lens(&mut self, aperture: Aperture, focus: f32, aspect: f32) -> Result<(), String> {
-        if !FOCUS.contains(&focus) {
-            return Err(format!("a focus of {focus} m is not possible: it is from 1e-6 to 1e9 m"));
-        }
+        Lens::check_focus(focus)?;
         let diameter = self.diameter(aperture, aspect);
         let diameter = diameter.ok_or("only a perspective camera has an aperture")?;
         if diameter > WIDEST {
@@ -222,19 +233,24 @@ impl Camera {
         let Self { origin, right, up, forward, projection, shift: [shift_x, shift_y], lens, .. } = *self;
         let longer = 2.0 * width.max(height) as f32;
         let shift = [shift_x * longer / width as f32, shift_y * longer / height as f32];
-        let half_height = match projection {
-            Projection::Perspective { vertical_fov } => libm::tanf(0.5 * vertical_fov),
-            Projection::Orthographic { half_height } => half_height,
-            Projection::Panorama { .. } => 1.0,
-        };
-        let half_width = match projection {
-            Projection::Panorama { .. } => 1.0,
-            _ => half_height * width as f32 / height as f32,
-        };
+        let sides = |half_height: f32| [half_height * width as f32 / height as f32, half_height];
         let of_lens = |Lens { radius, focus }| message::Projection::ThinLens {
             right: (right * radius).to_array(),
             up: (up * radius).to_array(),
             focus,
+        };
+        let ([half_width, half_height], projection) = match projection {
+            Projection::Perspective { vertical_fov } => {
+                let lens = lens.map_or(message::Projection::Pinhole, of_lens);
+                (sides(libm::tanf(0.5 * vertical_fov)), lens)
+            }
+            Projection::Orthographic { half_height } => {
+                (sides(half_height), message::Projection::Orthographic)
+            }
+            Projection::Panorama { angles } => {
+                let angles = angles.map(|angle| 0.5 * angle);
+                ([1.0; 2], message::Projection::Panorama { angles })
+            }
         };
         message::Camera {
             origin: origin.to_array(),
@@ -242,13 +258,7 @@ impl Camera {
             right: (right * half_width).to_array(),
             up: (up * half_height).to_array(),
             shift,
-            projection: match projection {
-                Projection::Perspective { .. } => lens.map_or(message::Projection::Pinhole, of_lens),
-                Projection::Orthographic { .. } => message::Projection::Orthographic,
-                Projection::Panorama { angles } => {
-                    message::Projection::Panorama { angles: angles.map(|angle| 0.5 * angle) }
-                }
-            },
+            projection,
         }
     }
 

@@ -81,13 +81,12 @@ impl SeenSums {
 
     /// Adds a sample: the features of the surface that it sees, and the surface's depth, metres.
     pub(super) fn add(&mut self, header: &Header, features: &Features, depth: f32) {
-        let sums = self;
         let albedo = features.albedo.clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
         let normal = features.normal * NORMAL_STEPS as f32;
         // Conversions round towards zero and saturate. The maximum number of samples does not overflow the
         // sums of albedo and normal.
         for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
-            let (Some(albedo_sum), Some(normal_sum)) = (sums.albedo.get_mut(axis), sums.normal.get_mut(axis))
+            let (Some(albedo_sum), Some(normal_sum)) = (self.albedo.get_mut(axis), self.normal.get_mut(axis))
             else {
                 continue;
             };
@@ -95,8 +94,8 @@ impl SeenSums {
             *normal_sum = normal_sum.saturating_add(normal as i32);
         }
         let depth = depth * (DEPTH_STEPS as f32 / header.sum_scale().depth);
-        sums.depth = sums.depth.saturating_add(depth as i64);
-        sums.surfaces = sums.surfaces.saturating_add(1);
+        self.depth = self.depth.saturating_add(depth as i64);
+        self.surfaces = self.surfaces.saturating_add(1);
     }
 }
 

@@ -7,7 +7,6 @@ mod corners;
 mod coverage;
 mod cut_out;
 mod flat_glass;
-mod identity;
 pub mod light;
 mod materials;
 mod normal_map;
@@ -24,7 +23,6 @@ mod triangles;
 pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
 pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, for_each_hit, transmittance};
 pub use cut_out::is_there;
-pub use identity::read_identity;
 pub use reflection::{
     DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
 };
@@ -33,6 +31,7 @@ pub use specular::Specular;
 pub use surface::{Detail, SURFACE_CHOICES, Surface, read_surface, read_surface_with};
 pub use texture::{decode_texel, read_texture, sample_texture};
 pub use triangle::{Hit, Intersection, RayFrame};
+pub use triangles::read_identity;
 
 use core::ops::Range;
 

@@ -1,7 +1,7 @@
-//! Triangles and instances in card memory.
+//! Triangles, instances and identities in card memory.
 
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::image::SectionKind;
+use photoncard_shared::image::{IDENTITIES_PER_LINE, SectionKind};
 use photoncard_shared::layout::{
     BvhLeaf, Instance, LEAF_TRIANGLES, NO_INSTANCE, Triangle, TriangleId, placed_point,
 };
@@ -48,4 +48,25 @@ pub(super) fn read_instance(
 #[inline(never)]
 pub(super) fn place_leaf(line: &[u8; LINE_BYTES], instance: &Instance, moved: &mut [u8; LINE_BYTES]) {
     *moved = BvhLeaf(line).placed(&instance.to_world);
+}
+
+/// Reads the identity of a triangle, the number of a pair of object and material: its own value or, of a
+/// triangle in a group, the sum of its value and the first value of the instance.
+///
+/// # Errors
+/// If the card image has no identities, or is invalid.
+pub fn read_identity(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    TriangleId { index, instance }: TriangleId,
+) -> Result<u32, Fault> {
+    let mut read = |index| {
+        let value = scene.record::<4, IDENTITIES_PER_LINE>(memory, SectionKind::Identities, index)?;
+        Ok(u32::from_le_bytes(*value))
+    };
+    let own = read(index)?;
+    if instance == NO_INSTANCE {
+        return Ok(own);
+    }
+    Ok(read(instance.wrapping_mul(LEAF_TRIANGLES as u32))?.wrapping_add(own))
 }

@@ -60,7 +60,7 @@ impl Wish {
             Extent::Height(metres) => (None, Some(metres), None),
             Extent::Angles(degrees) => (None, None, Some(degrees)),
         };
-        // What a projection cannot have does not survive the change to it.
+        // Only perspective pictures have a lens, and panoramas have no shift.
         if !matches!(shown, Extent::Fov(_)) {
             (picture.aperture, picture.focus) = (None, None);
         }

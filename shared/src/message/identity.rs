@@ -184,7 +184,7 @@ mod tests {
             };
             prop_assert_eq!(read(&numbers), Some(sum));
             numbers[place] = number;
-            // What is read is what it was written from.
+            // Entries that can be read are those of a sum.
             if let Some(other) = read(&numbers) {
                 let samples: Vec<_> = other.iter().collect();
                 prop_assert_eq!(sum_of(&samples), other);

@@ -5,7 +5,8 @@
 //! photoncard partial render 4\n
 //! { settings as JSON }\n
 //! CRC-32C: u32
-//! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height, first sample, samples: u32 each | pixels, 60 to 236 bytes each | CRC-32C: u32
+//! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height, first sample, samples: u32 each
+//!         | pixels, 60 to 236 bytes each | CRC-32C: u32
 //! ...
 //! ```
 //!

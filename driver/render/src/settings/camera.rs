@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use photoncard_firmware::scene::Ray;
 use photoncard_firmware::scene::camera::{depth_per_distance, ray_at};
-use photoncard_scene::{Aperture, Camera, Projection, Scene};
+use photoncard_scene::{Aperture, Camera, Lens, Projection, Scene};
 
 use super::{Picture, RenderSettings};
 use crate::error::RenderError;
@@ -115,18 +115,13 @@ impl Picture {
                 "give the focus in metres, such as 2.5",
             ));
         };
+        if let Some(focus) = focus {
+            let remedy = "give metres, such as 2.5";
+            Lens::check_focus(focus).map_err(|reason| refused("picture.focus", &focus, reason, remedy))?;
+        }
+        let remedy = "give one such as f/2.8, of a perspective camera";
         let set = camera.set_lens(opening, distance, width as f32 / height as f32);
-        set.map_err(|reason| match focus {
-            Some(focus) if camera.vertical_fov().is_some() && reason.contains("focus") => {
-                refused("picture.focus", &focus, reason, "give metres, such as 2.5")
-            }
-            _ => refused(
-                "picture.aperture",
-                &opening,
-                reason,
-                "give one such as f/2.8, of a perspective camera",
-            ),
-        })
+        set.map_err(|reason| refused("picture.aperture", &opening, reason, remedy))
     }
 }
 

@@ -1,7 +1,6 @@
 //! Cameras of the file, or a default one that shows the whole scene.
 
 use std::collections::BTreeSet;
-use std::ops::RangeInclusive;
 
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json::camera::{Orthographic, Type};
@@ -12,6 +11,7 @@ use serde_json::Value;
 use super::document::Document;
 use super::extras;
 use super::inside::{self, Framed};
+use crate::camera::EXTENTS;
 use crate::error::SceneError;
 use crate::{Aperture, Camera, FRAMED, Projection, Scene};
 
@@ -24,9 +24,6 @@ const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 /// Vertical field of view of a default camera inside a room: 65 degrees, in radians.
 const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
 
-/// Halves of the extents of an orthographic picture that are possible, metres.
-const EXTENTS: RangeInclusive<f32> = 1e-9..=1e12;
-
 /// Properties of a camera under the key `photoncard` of its `extras`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,7 +32,7 @@ struct Extras {
     shift: Option<[f32; 2]>,
     /// Diameter in metres, or an f-number such as `f/2.8`; of a picture of the file's aspect ratio.
     aperture: Option<Value>,
-    /// [`Lens::focus`], metres.
+    /// [`crate::Lens::focus`], metres.
     focus: Option<f32>,
     /// Angles of longitude and latitude, degrees.
     panorama: Option<[f32; 2]>,
