@@ -83,6 +83,7 @@ cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$files"
 cp -r docs "$files/docs"
 cp scenes/README.md scenes/cornell.gltf "$files/scenes"
 third_party >"$files/LICENSES-OF-CRATES.txt"
+cp driver/scene/src/sky/hosek_wilkie_license.txt "$files/LICENSE-OF-SKY-DATA.txt"
 
 mkdir -p "$out"
 tar --sort=name --mtime="@$time" --owner=0 --group=0 --numeric-owner --mode=u+rw,go=u-w --format=ustar -C "$work" -cf - "$name" |

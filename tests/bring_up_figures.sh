@@ -8,8 +8,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 page=docs/bring-up.md
 tolerance=5
-# Flash that docs/bring-up.md asks of a board, bytes.
+# Flash that docs/bring-up.md asks of a board, bytes: with an Arm processor, and with RISC-V.
 flash=$((512 * 1024))
+flash_of_riscv=$((544 * 1024))
 
 images=(mps2-an386 mps2-an386-tcp virt-riscv32 stm32h747i-disco)
 declare -A target_of=(
@@ -99,7 +100,8 @@ instructions)
     ;;
 check)
     build
-    for image in "${images[@]}"; do sizes_of "$image"; done | awk -v most="$flash" '
+    for image in "${images[@]}"; do sizes_of "$image"; done | awk -v arm="$flash" -v riscv="$flash_of_riscv" '
+        { most = $1 ~ /riscv/ ? riscv : arm }
         $4 > 0 { print $1 ": " $4 " bytes of data have initial values, which take flash"; bad = 1 }
         $6 > most { print $1 ": flash of " $6 " bytes, above " most; bad = 1 }
         END { exit bad }'

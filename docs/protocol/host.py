@@ -104,7 +104,7 @@ def frame_of(head, side):
         b"\0" + number(0),  # no layers, box filter
         number(1) + b"\0",  # one tile in flight, no kept records
         option(threshold and floats(threshold)),
-        b"\0" * 4,  # a background, and no sums of position, coverage and identities
+        b"\0" * 6,  # a background, no sums of position, coverage, identities and light groups; radiance
     ]
     return b"".join(parts)
 

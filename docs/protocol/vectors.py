@@ -22,6 +22,7 @@ PROJECTION = {
     1: (("right", VECTOR), ("up", VECTOR), ("focus", "f32")),
     2: (),
     3: (("angles", "pair"),),
+    4: (("line", "u32"), ("first", "u32"), ("count", "u32")),
 }
 CAMERA = (
     ("origin", VECTOR), ("forward", VECTOR), ("right", VECTOR), ("up", VECTOR), ("shift", "pair"),
@@ -35,7 +36,7 @@ FRAME = (
     ("bins", "u32"), ("drain", 4), ("queue", "u32"), ("radiance", 2), ("caustics", [CAUSTICS]),
     ("layers", "flag"), ("filter", 3), ("in_flight", "u32"), ("keep_records", "flag"),
     ("adaptive_threshold", ["f32"]), ("transparent", "flag"), ("position", "flag"), ("coverage", "flag"),
-    ("identities", "flag"),
+    ("identities", "flag"), ("light_groups", "u8"), ("irradiance", "flag"),
 )
 BUDGET = tuple(
     (name, "u64" if name == "dram_bytes" else "u32")
@@ -80,6 +81,7 @@ REPLIES = (
 COUNTERS = 26
 
 WRITERS = {
+    "u8": lambda value: bytes([value]),
     "u16": number, "u32": number, "u64": number,
     "x64": lambda value: number(int(value, 16)),
     "f32": floats,
@@ -91,6 +93,7 @@ WRITERS = {
     "counters": lambda values: b"".join(number(int(value, 16)) for value in values),
 }
 READERS = {
+    "u8": lambda reader: reader.raw(1)[0],
     "u16": lambda reader: reader.number(16),
     "u32": Reader.number,
     "u64": lambda reader: reader.number(64),

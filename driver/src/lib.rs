@@ -104,9 +104,9 @@
 //! This crate re-exports the modules of seven crates. Each of them imports only crates above it in this list;
 //! `photoncard_cards` and `photoncard_denoise` import only `photoncard_picture`.
 //!
-//! - [`photoncard_picture`] ([`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`],
-//!   [`difference`], [`output`], [`printable`], [`choice`]): pixels of a picture and their destinations; its
-//!   files; names of enumerations.
+//! - [`photoncard_picture`] ([`film`], [`false_color`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`],
+//!   [`tone_mapping`], [`difference`], [`output`], [`printable`], [`choice`]): pixels of a picture and their
+//!   destinations; its files; names of enumerations.
 //! - [`photoncard_denoise`] ([`denoise`]): Open Image Denoise, loaded at run time.
 //! - [`photoncard_scene`] ([`scene`], [`error`]): triangles, materials, textures, lights and cameras of a
 //!   glTF file; its errors.
@@ -139,7 +139,8 @@ pub use photoncard_cards::{dispatcher, link, scheduler, session};
 pub use photoncard_denoise as denoise;
 pub use photoncard_map::{bvh, pack, photon, photon_map};
 pub use photoncard_picture::{
-    choice, cryptomatte, difference, exr, film, layer, output, printable, sink, sums, tone_mapping, viewer,
+    choice, cryptomatte, difference, exr, false_color, film, layer, output, printable, sink, sums,
+    tone_mapping, viewer,
 };
 pub use photoncard_render::{self as render, cost_model, display, emulator, partial, parts, quality};
 pub use photoncard_scene::{self as scene, error};

@@ -109,6 +109,7 @@ pub mod gather;
 pub mod importance;
 pub mod irradiance_cache;
 pub mod kind;
+pub mod light_groups;
 pub mod memory;
 pub mod photon;
 pub mod render;

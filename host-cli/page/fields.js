@@ -81,23 +81,40 @@ export class Fields {
         return this.follow(name, own, control, value => input.value = hexOf(value));
     }
 
-    // A colour beyond 1, as colour and strength.
     emission(name, own) {
+        const number = element("input", { type: "number", min: 0, step: "any" });
+        return this.#tinted(name, own, ["Emission", "Strength, W/(sr m²)"], number);
+    }
+
+    // Factors of the light of a group.
+    gain(name, own) {
+        const number = element("input", { type: "range", min: 0, max: 4, step: 0.01 });
+        return this.#tinted(name, own, ["Colour", "Factor"], number);
+    }
+
+    // A colour beyond 1, as colour and strength.
+    #tinted(name, own, [ofTint, ofNumber], number) {
         let colour = [1, 1, 1], strength = 0;
         const tint = element("input", { type: "color" });
-        const number = element("input", { type: "number", min: 0, step: "any" });
-        const edit = () => isNumber(number) && this.edit(name, colour.map(part => part * Number(number.value)));
+        const told = element("output");
+        const edit = () => {
+            if (!isNumber(number)) return;
+            told.textContent = short(number.value);
+            this.edit(name, colour.map(part => part * Number(number.value)));
+        };
         tint.addEventListener("input", () => {
             colour = linearOf(tint.value);
             edit();
         });
         number.addEventListener("input", edit);
         const control = element("div", {},
-            element("label", {}, "Emission", tint), element("label", {}, "Strength, W/(sr m²)", number));
+            element("label", {}, ofTint, tint),
+            element("label", {}, ofNumber, number.type === "range" ? element("span", {}, number, told) : number));
         return this.follow(name, own, control, value => {
             strength = Math.max(...rgb(value));
             if (strength > 0) colour = rgb(value).map(part => part / strength);
             [tint.value, number.value] = [hexOf(colour), short(strength)];
+            told.textContent = short(strength);
         });
     }
 

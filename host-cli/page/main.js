@@ -24,7 +24,7 @@ const times = new Times();
 // State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map(), mixes: new Map() };
 // Pixel under the pointer; null for none.
 let pointed = null;
 
@@ -52,7 +52,11 @@ const panel = new Panel(
         asked.edits.set(name, value);
         sending.soon();
     },
-    (name, value) => send(name, { type: "setting", name, value }));
+    (name, value) => send(name, { type: "setting", name, value }),
+    (name, value) => {
+        asked.mixes.set(name, value);
+        sending.soon();
+    });
 
 const view = {
     get camera() { return camera; },
@@ -97,6 +101,7 @@ function hello(message) {
     scene = { ...message.scene };
     byId("scene").textContent = document.title = scene.name;
     panel.show(scene);
+    panel.showGroups(message.light_groups);
     const options = (id, entries) =>
         byId(id).replaceChildren(...entries.map(([value, textContent]) => element("option", { value, textContent })));
     options("layer", message.layers.map(name => [name, name]));
@@ -117,7 +122,7 @@ function setSteers(value) {
     steers = value;
     asked.size = null;
     byId("spectator").hidden = steers;
-    for (const field of document.querySelectorAll("#lights, #materials, #techniques, #camera, #fov, #side, #reset")) {
+    for (const field of document.querySelectorAll("#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset")) {
         field.inert = !steers;
     }
     if (steers) fit();
@@ -223,6 +228,10 @@ function sendMoves() {
     }
     for (const [name, value] of asked.edits) send(name, { type: "set", name, value });
     asked.edits.clear();
+    // The picture stays, with other light: its tiles come again.
+    if (asked.mixes.size > 0) picture.restart(picture.version);
+    for (const [name, value] of asked.mixes) send("mix", { type: "mix", name, value });
+    asked.mixes.clear();
 }
 
 function showCentre() {
@@ -278,6 +287,7 @@ on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" 
     view.move({ ...camera, ...extent(camera, () => Number(target.value)) }, false));
 on("reset", "click", () => {
     asked.edits.clear();
+    asked.mixes.clear();
     followCamera();
     send("reset", { type: "reset" });
 });
@@ -305,7 +315,7 @@ window.photoncard = {
     get state() { return state; },
     // True if the picture is finished and no change of it is on its way. A change that the command refuses has no answer.
     get isSettled() {
-        const isQuiet = !toSend && asked.edits.size === 0 && (times.waiting === 0 || times.silence > 1500);
+        const isQuiet = !toSend && asked.edits.size + asked.mixes.size === 0 && (times.waiting === 0 || times.silence > 1500);
         return isOpen && isQuiet && Boolean(state?.settled) && picture.isWhole && picture.step === 1 &&
             picture.version === state.version && !drawing.isWaiting;
     },

@@ -37,9 +37,10 @@ export class Panel {
     #told = new Map();
     #shown = "";
 
-    // `edit(name, value)` changes the scene, `set(name, value)` a technique.
-    constructor(edit, set) {
+    // `edit(name, value)` changes the scene, `set(name, value)` a technique, `mix(name, value)` the light of a group.
+    constructor(edit, set, mix) {
         this.edits = edit;
+        this.mixes = mix;
         this.techniques = new Fields(set);
         this.#fill("techniques", TECHNIQUES.map(([name, label, choices]) => {
             const told = faint("");
@@ -65,6 +66,14 @@ export class Panel {
             ...environment ? [fields.number("environment.strength", "Environment", environment.strength)] : [],
         ], "The scene has no light that can be changed.");
         this.#fill("materials", ofName.map(material => this.#material(fields, material)), "The scene has none.");
+    }
+
+    // The light groups of a new connection.
+    showGroups(names) {
+        this.groups = new Fields(this.mixes);
+        document.getElementById("mix").hidden = names.length === 0;
+        this.#fill("mix", names.map(name => element("fieldset", {},
+            element("legend", { textContent: name }), this.groups.gain(name, 1))));
     }
 
     #fill(id, children, otherwise = "") {
@@ -100,7 +109,8 @@ export class Panel {
     }
 
     // The state of the picture; the last change may have been refused.
-    update({ changes = [], settings = {}, cost, settled }, isRefused = false) {
+    update({ changes = [], settings = {}, gains = {}, cost, settled }, isRefused = false) {
+        this.groups?.show(new Map(Object.entries(gains)), isRefused);
         this.scene?.show(new Map(changes.map(({ name, value }) => [name, value])), isRefused);
         this.techniques.show(new Map(Object.entries(settings)), isRefused);
         if (cost) this.#showCost(cost);

@@ -15,14 +15,17 @@
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
-//! | `render` (and `prepare`), `farm`, `view`, `scene`, `documents`, `study` | one module for each command |
-//! | `card`, `pictures` | commands on cards, and on pictures (`merge`, `tonemap`, `diff`) |
+//! | `render` (and `prepare`), `measure`, `bake`, `autonomy`, `farm`, `view` | one module for each command |
+//! | `scene`, `documents`, `study` | one module for each command |
+//! | `card`, `pictures` | commands on cards, and on pictures (`merge`, `mix`, `tonemap`, `diff`) |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
 //! from Rust, use `photoncard_driver` directly.
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod autonomy;
+mod bake;
 mod card;
 mod console;
 mod documents;
@@ -33,6 +36,7 @@ mod flags;
 #[cfg(target_os = "linux")]
 mod hang_up;
 mod input;
+mod measure;
 mod memory;
 mod notices;
 mod outputs;
@@ -68,9 +72,13 @@ pub fn main() -> ExitCode {
     let result = match &mut arguments.command {
         Command::Render(options) => render::run(options),
         Command::Prepare(options) => render::prepare::run(options),
+        Command::Measure(options) => measure::run(options),
+        Command::Autonomy(options) => autonomy::run(options),
+        Command::Bake(options) => bake::run(options),
         Command::Merge(options) => pictures::merge(options),
         Command::Farm(command) => farm::run(command),
         Command::View(options) => view::run(options),
+        Command::Mix(options) => pictures::mix(options),
         Command::Tonemap(options) => pictures::tonemap(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
         Command::Card(CardCommand::List) => card::list(),

@@ -28,8 +28,13 @@ impl Uses {
         Self {
             view: !picture.states_view(),
             animations: frames.is_some_and(|frames| frames.numbers().is_some()),
-            environment: options.environment.is_none(),
+            environment: !options.states_environment(),
         }
+    }
+
+    /// Returns the contents that a measurement uses, which has no camera.
+    pub(crate) fn without_view(options: &SceneOptions) -> Self {
+        Self { view: false, animations: false, environment: !options.states_environment() }
     }
 
     fn uses(&self, concern: Concern) -> bool {

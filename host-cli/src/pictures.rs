@@ -1,16 +1,23 @@
-//! Commands `photoncard merge`, `photoncard tonemap` and `photoncard diff`, whose inputs are pictures.
+//! Commands `photoncard merge`, `photoncard mix`, `photoncard tonemap` and `photoncard diff`, whose inputs
+//! are pictures.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use photoncard_driver::difference::compare;
-use photoncard_driver::exr::{Shown, read};
+use photoncard_driver::exr::mix::Mix;
+use photoncard_driver::exr::{ExrError, Shown, read};
+use photoncard_driver::false_color::FalseColor;
 use photoncard_driver::film::Film;
+use photoncard_driver::output;
 use photoncard_driver::parts::{Part, PartError, Parts};
-use photoncard_driver::tone_mapping::{PngError, write_png};
+use photoncard_driver::tone_mapping::{PngError, luminance, png_bytes, write_colours, write_png};
+use serde_json::Value;
 
-use crate::arguments::{DiffOptions, MergeOptions, PictureFormat, PictureOutput, TonemapOptions};
-use crate::console::{counted, print_json, printable_json, say};
+use crate::arguments::{
+    DiffOptions, MergeOptions, MixOptions, PictureFormat, PictureOutput, ProgressForm, TonemapOptions,
+};
+use crate::console::{counted, print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::outputs;
 use crate::render::files::{Form, check_standard_output, denoised, denoised_by, denoiser, write_picture};
@@ -44,6 +51,7 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
         layers: merged.layers,
         is_transparent: merged.is_transparent,
         identities: merged.identities.map(Arc::new),
+        illuminance: None,
         sample_type: *sample_type,
         tone: tone.mapping(),
         denoised: denoised(denoiser, &merged.film, merged.is_transparent, None)?,
@@ -83,10 +91,59 @@ fn merge_failure(error: PartError) -> Failure {
     }
 }
 
+/// Mixes the light groups of a picture and writes it.
+pub(crate) fn mix(options: &MixOptions) -> Result<(), Failure> {
+    let MixOptions { input, gains, pictures, tone, denoise } = options;
+    for (others, needless) in
+        [(PictureFormat::Part, part::needless as fn() -> Failure), (PictureFormat::Video, video::needless)]
+    {
+        if pictures.iter().any(|picture| picture.format == others) {
+            return Err(needless());
+        }
+    }
+    check_standard_output(pictures, None, ProgressForm::Text)?;
+    let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
+    outputs::check(&[(input, "the picture to mix")], &written, &[])?;
+    let denoiser = denoiser(*denoise)?;
+    let mut mix = Mix::read(input).map_err(|error| Failure::input_error(&error))?;
+    mix.apply(gains).map_err(|error| Failure::input_error(&error))?;
+    let mut shown = mix.radiance();
+    if let Some(denoiser) = denoiser {
+        let features = mix.features().map_err(|error| Failure::input_error(&error))?;
+        shown = denoiser
+            .radiance_of(mix.size(), features.into_iter(), None, &|| false)
+            .map_err(|error| Failure::work_error(&error))?;
+        // As in a render, pixels without a surface stay black.
+        let uncovered = shown.iter_mut().zip(mix.alpha().unwrap_or_default());
+        uncovered.filter(|(_, alpha)| *alpha == 0.0).for_each(|(radiance, _)| *radiance = [0.0; 3]);
+        mix.set_denoised(&shown, denoised_by(denoiser));
+    }
+    let (size, alpha, provenance) = (mix.size(), mix.alpha(), mix.provenance());
+    let bytes = mix.bytes().map_err(|error| Failure::work_error(&error))?;
+    for picture in pictures {
+        if picture.format == PictureFormat::Exr {
+            output::write(&picture.path, &bytes).map_err(|error| Failure::work_error(&error))?;
+            continue;
+        }
+        let radiance = shown.iter().copied();
+        let (alpha, provenance) = (alpha.as_deref(), provenance.as_deref());
+        let png = png_bytes(&picture.path, size, radiance, alpha, tone.mapping(), provenance);
+        let png = png.map_err(|error| Failure::work_error(&error))?;
+        match picture.file() {
+            Some(path) => output::write(path, &png).map_err(|error| Failure::work_error(&error))?,
+            None => write_bytes(&png)?,
+        }
+    }
+    Ok(())
+}
+
 /// Tone-maps a picture and writes it.
 pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
-    let TonemapOptions { input, output, tone } = options;
+    let TonemapOptions { input, output, tone, false_color, .. } = options;
     outputs::check(&[(input, "the picture to read")], &[output], &[])?;
+    if let Some(range) = false_color {
+        return in_false_color(options, *range);
+    }
     let picture = read(input, Shown::Denoised).map_err(|error| Failure::input_error(&error))?;
     let radiance = picture.pixels.iter().copied();
     let provenance = picture.provenance.as_deref();
@@ -96,6 +153,34 @@ pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
         PngError::NotANumber { .. } => Failure::input_error(&error),
         _ => Failure::work_error(&error),
     })
+}
+
+/// Writes illuminance or luminance in false colours.
+fn in_false_color(options: &TonemapOptions, [low, high]: [f32; 2]) -> Result<(), Failure> {
+    let TonemapOptions { input, output, lumens_per_watt, .. } = options;
+    let (picture, unit, scale) = match read(input, Shown::Illuminance) {
+        Ok(picture) => (picture, "lx", None),
+        Err(ExrError::NoColour { .. }) => {
+            let picture = read(input, Shown::Denoised).map_err(|error| Failure::input_error(&error))?;
+            let provenance = picture.provenance.as_deref().unwrap_or_default();
+            let settings = serde_json::from_str::<Value>(provenance).unwrap_or_default();
+            let unit = match (settings["irradiance"] == Value::Bool(true), lumens_per_watt) {
+                (true, None) => "W/m2",
+                (true, Some(_)) => "lx",
+                (false, _) => "cd/m2",
+            };
+            (picture, unit, Some(lumens_per_watt.unwrap_or(1.0)))
+        }
+        Err(error) => return Err(Failure::input_error(&error)),
+    };
+    let value = |[red, green, blue]: [f32; 3]| match scale {
+        Some(lumens) => lumens * luminance([red, green, blue]),
+        None => red,
+    };
+    let values: Vec<f32> = picture.pixels.iter().copied().map(value).collect();
+    let colours = FalseColor { low, high, unit }.picture(picture.size()[0], &values);
+    write_colours(output, &colours, picture.provenance.as_deref())
+        .map_err(|error| Failure::work_error(&error))
 }
 
 /// Prints the difference between two pictures as JSON.

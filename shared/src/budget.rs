@@ -20,8 +20,8 @@ pub struct Budget {
     pub scene_cache_bytes: u32,
     /// On-chip memory that the call stack takes, bytes.
     pub stack_bytes: u32,
-    /// Maximum number of pixels of a tile, in a picture without layers (separate direct, indirect and caustic
-    /// light).
+    /// Maximum number of pixels of a tile, in a picture whose light is in one sum
+    /// ([`PixelForm::sums_of_light`](crate::message::PixelForm::sums_of_light)).
     pub tile_pixels: u32,
     /// Maximum k of a search for the k nearest photons.
     pub neighbors: u32,
@@ -48,19 +48,24 @@ pub struct Budget {
     pub waiting_blocks: u32,
 }
 
+/// Maximum number of light groups.
+pub const MAX_LIGHT_GROUPS: usize = 4;
+
 /// Number of sums per pixel in a picture with layers: direct light, indirect light, caustics, and a count of
 /// gathers.
 pub const SUMS_WITH_LAYERS: u32 = 4;
 
-/// Number of sums that a chip keeps per pixel: [`SUMS_WITH_LAYERS`] with layers, 1 without.
-pub const fn sums_of_pixel(layers: bool) -> u32 {
-    if layers { SUMS_WITH_LAYERS } else { 1 }
-}
+/// Maximum of [`PixelForm::sums_of_light`](crate::message::PixelForm::sums_of_light).
+pub const MAX_SUMS: u32 = SUMS_WITH_LAYERS + MAX_LIGHT_GROUPS as u32;
 
 impl Budget {
-    /// Maximum number of pixels of a tile, in a picture without or with layers.
-    pub const fn pixels_of_tile(&self, layers: bool) -> u32 {
-        self.tile_pixels / sums_of_pixel(layers)
+    /// Maximum number of pixels of a tile, in a picture whose pixels have `sums` sums of light
+    /// ([`PixelForm::sums_of_light`](crate::message::PixelForm::sums_of_light)).
+    pub const fn pixels_of_tile(&self, sums: u32) -> u32 {
+        match self.tile_pixels.checked_div(sums) {
+            Some(pixels) => pixels,
+            None => self.tile_pixels,
+        }
     }
 }
 

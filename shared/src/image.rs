@@ -223,6 +223,8 @@ pub struct Lights {
     /// Number of columns and rows, 1 to 65535, of the grid of cells from which the environment is sampled.
     /// Columns are equal steps of azimuth, rows of polar angle.
     pub cells: [u16; 2],
+    /// Light group of the environment, below [`MAX_LIGHT_GROUPS`](crate::budget::MAX_LIGHT_GROUPS).
+    pub light_group: u8,
 }
 
 impl Lights {
@@ -234,6 +236,7 @@ impl Lights {
         radiance: [0.0; 3],
         texture: None,
         cells: [1; 2],
+        light_group: 0,
     };
 
     fn is_sound(&self) -> bool {
@@ -272,6 +275,8 @@ impl fmt::Display for HeaderError {
 
 impl core::error::Error for HeaderError {}
 
+/// Offset of [`Lights::light_group`] in the header, bytes.
+const GROUP: usize = 10;
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;
 const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
@@ -309,6 +314,7 @@ impl Header {
             |offset: usize, value: &[u8]| bytes[offset..offset + value.len()].copy_from_slice(value);
         put(0, &MAGIC);
         put(8, &LAYOUT_VERSION.to_le_bytes());
+        put(GROUP, &[self.lights.light_group]);
         put(12, &self.lines.to_le_bytes());
         put(16, &self.photon_power_unit.to_le_bytes());
         put(20, &self.radiance_unit.to_le_bytes());
@@ -318,7 +324,7 @@ impl Header {
             put(PHOTON_GRID + 4 * axis, &origin.to_le_bytes());
         }
         put(PHOTON_GRID + 12, &self.photon_grid.cell.to_le_bytes());
-        let Lights { emitters, environment, distant, radiance: [red, green, blue], texture, cells } =
+        let Lights { emitters, environment, distant, radiance: [red, green, blue], texture, cells, .. } =
             self.lights;
         for (index, number) in [emitters, environment, distant, red, green, blue].into_iter().enumerate() {
             put(LIGHTS + 4 * index, &number.to_le_bytes());
@@ -360,7 +366,10 @@ impl Header {
                 origin: core::array::from_fn(|axis| word(PHOTON_GRID + 4 * axis) as i32),
                 cell: f32::from_bits(word(PHOTON_GRID + 12)),
             },
-            lights: Self::read_lights(|index| word(LIGHTS + 4 * index)),
+            lights: Lights {
+                light_group: (word(8) >> 16) as u8,
+                ..Self::read_lights(|index| word(LIGHTS + 4 * index))
+            },
             sections: core::array::from_fn(|index| Section {
                 first_line: word(SECTION_TABLE + 8 * index),
                 records: word(SECTION_TABLE + 8 * index + 4),
@@ -380,6 +389,7 @@ impl Header {
             radiance: [number(3), number(4), number(5)],
             texture: (texture != NO_ENVIRONMENT).then_some(texture),
             cells: [cells as u16, (cells >> 16) as u16].map(|cells| cells.max(1)),
+            light_group: 0,
         }
     }
 
@@ -431,6 +441,7 @@ mod tests {
                 radiance: [1.0, 2.0, 3.0],
                 texture: Some(7),
                 cells: [128, 64],
+                light_group: 3,
             },
             sections,
         }

@@ -310,6 +310,7 @@ fn structures_have_their_golden_bytes() {
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: true,
+        light_groups: 2,
         filter: Filter::BlackmanHarris,
         in_flight: 9,
         keep_records: true,
@@ -318,6 +319,7 @@ fn structures_have_their_golden_bytes() {
         position: false,
         coverage: true,
         identities: false,
+        irradiance: true,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero, one, zero].concat();
@@ -335,7 +337,7 @@ fn structures_have_their_golden_bytes() {
         &one,
         &[1, 2, 9, 1, 1],
         &one,
-        &[1, 0, 1, 0],
+        &[1, 0, 1, 0, 2, 1],
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);
@@ -452,30 +454,35 @@ fn sums_of_a_pixel_survive_their_record() {
         LayerSums { direct: [1, 2, 3], indirect: [4, 5, 6], caustic: [7, 8, i64::MAX], gathers: 4096 };
     let mut identities = IdentityCoverage::NONE;
     (0..20).for_each(|identity| identities.add(identity, 100 + identity));
+    let groups = GroupSums::new([[12, 15, i64::MAX], [1, 0, 0], [0, 1, 2]]);
     let full = PixelSums {
+        light_groups: Some(groups),
         position: Some([-1, 2, i64::MIN]),
         coverage: Some(u32::MAX),
         identities: Some(identities),
         ..view.with_layers(layers)
     };
-    let forms = [false, true].map(|layers| {
-        let form = |position, coverage, identities| PixelForm { layers, position, coverage, identities };
-        let flags = [false, true];
-        flags.map(|p| flags.map(|c| flags.map(|i| full.in_form(form(p, c, i)))))
+    let forms = (0..64_u8).map(|choice| {
+        let is_set = |bit: u8| choice >> bit & 1 != 0;
+        let light_groups = choice >> 4;
+        let [layers, position, coverage, identities] = [0, 1, 2, 3].map(is_set);
+        full.in_form(PixelForm { layers, light_groups, position, coverage, identities })
     });
-    let lit = [view.with_light([9, 10, 11]), view.with_layers(layers)];
-    for sums in forms.as_flattened().as_flattened().as_flattened().iter().copied().chain(lit) {
+    let lit = [view.with_light([9, 10, 11]), view.with_layers(layers), view.with_light_groups(groups)];
+    for sums in forms.chain(lit) {
         let mut bytes = Vec::new();
         sums.write(&mut |part| bytes.extend_from_slice(part));
         assert_eq!(bytes.len(), sums.form().record_bytes());
-        assert_eq!(PixelForm::of_length(bytes.len()), Some(sums.form()));
-        assert_eq!(PixelSums::read(&bytes), Some(sums));
+        assert_eq!(PixelSums::read(sums.form(), &bytes), Some(sums));
         assert_eq!(bytes[8..12], [0xff; 4]);
         assert_eq!(bytes[24..36], [[0xf9, 0xff, 0xff, 0xff], [0xff; 4], [8, 0, 0, 0]].concat());
-        assert_eq!(PixelSums::read(&bytes[1..]), None);
-        assert!(PIXELS_BYTES >= 4 * bytes.len());
+        assert_eq!(PixelSums::read(sums.form(), &bytes[1..]), None);
+        assert!(PIXELS_BYTES >= 2 * bytes.len());
     }
     assert_eq!(view.with_layers(layers).light, [12, 15, i64::MAX]);
+    assert_eq!(view.with_light_groups(groups).light, [13, 16, i64::MAX]);
+    assert_eq!(full.plus(&full).light_groups.map(|sums| sums.sums()[1]), Some([2, 0, 0]));
+    assert_eq!(full.plus(&full.in_form(PixelForm::PLAIN)).form().light_groups, 0);
 }
 
 #[test]

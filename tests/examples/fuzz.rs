@@ -4,11 +4,11 @@
 //! [--first N] [--seconds N] [--folder PATH]`
 //!
 //! The targets are `frames`, `messages`, `session`, `image`, `gltf`, `meshopt`, `draco`, `textures`,
-//! `environments`, `exr`, `parts` and `prepared`. The profile `dev` checks for arithmetic overflow; `release`
-//! is that of users' programs. An input is a function of target, seed and number: `--first N --inputs 1`
-//! repeats input N. The bytes of an input that failed are written into the folder, by default
-//! `photoncard-fuzz` in the system's temporary folder. Several runs with different `--first` can share the
-//! work. If a failure ends the process, a file `*.at` contains the number of its input.
+//! `environments`, `profiles`, `exr`, `parts` and `prepared`. The profile `dev` checks for arithmetic
+//! overflow; `release` is that of users' programs. An input is a function of target, seed and number:
+//! `--first N --inputs 1` repeats input N. The bytes of an input that failed are written into the folder, by
+//! default `photoncard-fuzz` in the system's temporary folder. Several runs with different `--first` can
+//! share the work. If a failure ends the process, a file `*.at` contains the number of its input.
 
 use std::error::Error;
 use std::process::ExitCode;

@@ -65,7 +65,7 @@ fn image(points: impl Iterator<Item = [f32; 3]>) -> (CardImage, Vec<[f32; 3]>) {
         position,
         power: Rgbe::encode([1.0; 3], hash(index)),
         direction: (hash(index) as u16).to_le_bytes(),
-        axis: 0,
+        axis_or_group: 0,
         normal: 0,
         disc: FULL_DISC,
         direct: false,

@@ -1,9 +1,12 @@
 //! Small scene that has every feature of a scene.
 
+use std::path::Path;
+
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
-    Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, NormalMap, PunctualKind,
-    PunctualLight, Reflection, Scene, Sheen, Texture, Transmission, Triangle, VertexAttributes, Wrap,
+    Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, LightAxes, LightProfile, Material,
+    NormalMap, PunctualKind, PunctualLight, Reflection, Scene, Sheen, Texture, Transmission, Triangle,
+    VertexAttributes, Wrap,
 };
 
 use crate::shapes::{add_ball, add_tangents, add_textured_quad, cuboid};
@@ -25,12 +28,12 @@ const BUMPS: u32 = 12;
 const DENTS: u32 = 13;
 const WINDOW: u32 = 14;
 
-/// Creates a room with every feature. It has an emissive lamp, a point, a spot and a directional light, a sky
-/// through its open front, and walls with textures by both sets of coordinates. In the room are a mirror
-/// ball, a glass ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage with sheen and
-/// diffuse transmission, a coated board, a rough pane and a rough block of glass, and a glossy and a
-/// Lambertian sheet with normal maps. Under the lights are a shelf of tinted glass and a coated window with
-/// textures.
+/// Creates a room with every feature. It has an emissive lamp, a point, a spot and a directional light, a
+/// luminaire, a sky through its open front, and walls with textures by both sets of coordinates. In the room
+/// are a mirror ball, a glass ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage
+/// with sheen and diffuse transmission, a coated board, a rough pane and a rough block of glass, and a glossy
+/// and a Lambertian sheet with normal maps. Under the lights are a shelf of tinted glass and a coated window
+/// with textures.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
@@ -195,18 +198,34 @@ fn add_textures(scene: &mut Scene) {
     ];
 }
 
+/// Luminaire of two unequal sides.
+const PROFILE: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 5 1 2 0 0 0\n1 1 10\n0 45 120\n0 90 180 270 360\n\
+     1 .8 0  1 .3 .1  1 .2 .4  1 .9 .2  1 .8 0\n";
+
+/// Appends an item; returns its index.
+fn add<T>(list: &mut Vec<T>, item: T) -> u32 {
+    list.push(item);
+    list.len() as u32 - 1
+}
+
 fn add_lights(scene: &mut Scene) {
     let corner = |x: f32, z: f32| Vec3::new(0.3 * x, 0.98, 0.3 * z);
     let lamp = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], LAMP);
     scene.triangles.extend(lamp);
     let direction = Vec3::new(0.2, -0.5, -0.8).normalize();
     let position = Vec3::new(-0.7, 0.6, 0.5);
+    let axes = LightAxes { aim: Vec3::new(0.6, -0.8, 0.0), across: Vec3::new(0.8, 0.6, 0.0) };
+    let LightProfile { image, texture, .. } =
+        LightProfile::parse(PROFILE.as_bytes(), Path::new("lamp.ies")).expect("it is one");
+    let [texture, image] = [add(&mut scene.textures, texture), add(&mut scene.images, image)];
+    scene.textures[texture as usize].image = image;
     scene.lights = [
+        PunctualKind::Profile { position: Vec3::new(-0.6, 0.8, -0.5), texture },
         PunctualKind::Point { position: Vec3::new(0.7, 0.5, 0.6) },
         PunctualKind::Spot { position, direction, inner_cosine: 0.9, outer_cosine: 0.7 },
-        PunctualKind::Directional { direction },
+        PunctualKind::Directional { direction, angle: 0.0 },
     ]
-    .map(|kind| PunctualLight { name: "light".into(), kind, intensity: Vec3::new(0.9, 1.0, 0.8) })
+    .map(|kind| PunctualLight { name: "light".into(), kind, intensity: Vec3::new(0.9, 1.0, 0.8), axes })
     .to_vec();
     let texels = (0..32).map(|i| [0.2 + (i % 7) as f32 * 0.3, 0.5, (i % 3) as f32]).collect();
     scene.environment = Some(Environment { width: 8, height: 4, texels, strength: 1.0 });

@@ -11,6 +11,7 @@ use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::gather::{GatherTarget, PointIndex};
 use photoncard_firmware::kind::REFERENCE;
+use photoncard_firmware::light_groups::LightGroups;
 use photoncard_firmware::photon::CandidateBuffer;
 use photoncard_firmware::render::eye::see;
 use photoncard_firmware::render::final_gather::{GatherRayEnds, bundles, cast, gathered};
@@ -133,7 +134,8 @@ impl<'a> IndirectLight<'a> {
             for bundle in bundles(0..rays) {
                 cast(&mut context, &point, target, bundle, &mut ends).expect("sound");
                 for request in ends.iter().filter_map(|end| end.request.as_ref()) {
-                    sum += gathered(&mut context, request, candidates.view()).expect("sound");
+                    let brought = gathered(&mut context, request, candidates.view()).expect("sound");
+                    sum += brought.total(LightGroups::ONE);
                 }
             }
             sum * scene.header.radiance_unit

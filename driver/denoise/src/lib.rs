@@ -20,7 +20,7 @@ mod places;
 
 use std::path::PathBuf;
 
-use photoncard_picture::film::Film;
+use photoncard_picture::film::{Film, PixelValue};
 
 pub use self::library::{DenoiseError, MustStop};
 use self::library::{Device, Input, Library, Quality};
@@ -88,15 +88,34 @@ impl Denoiser {
         if !film.is_complete() {
             return Err(DenoiseError::Incomplete { missing: film.missing() });
         }
-        let size = [film.window().width() as usize, film.window().height() as usize];
+        let size = [film.window().width(), film.window().height()];
+        self.radiance_of(size, film.pixels(), threads, must_stop)
+    }
+
+    /// Does [`Self::radiance`] for pixels, row by row, of a picture of `size` columns and rows.
+    ///
+    /// # Errors
+    /// As [`Self::radiance`]. [`DenoiseError::Incomplete`] if there are fewer pixels.
+    pub fn radiance_of(
+        &self,
+        size: [u32; 2],
+        pixels: impl Iterator<Item = PixelValue>,
+        threads: Option<usize>,
+        must_stop: MustStop,
+    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        let size = size.map(|side| side as usize);
         let device = Device::new(&self.library, threads)?;
         let [mut radiance, mut albedo, mut normal] = [const { Vec::new() }; 3];
         let mut hits_surface = Vec::new();
-        for pixel in film.pixels() {
+        for pixel in pixels {
             hits_surface.push(pixel.depth.is_finite());
             radiance.push(pixel.radiance);
             albedo.push(pixel.albedo);
             normal.push(pixel.normal);
+        }
+        let missing = (size[0] * size[1]).saturating_sub(radiance.len());
+        if missing > 0 {
+            return Err(DenoiseError::Incomplete { missing });
         }
         let feature = |name, image: &[[f32; 3]]| {
             let input = Input { images: &[(name, image)], switches: &[], quality: Quality::Balanced };

@@ -18,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 
 use photoncard_shared::message::Tile;
 pub use photoncard_shared::message::{
-    LayerSums, Pixel as PixelValue, PixelForm, PixelLayers, PixelSums, SumScale,
+    GroupSums, LayerSums, Pixel as PixelValue, PixelForm, PixelLayers, PixelSums, SumScale,
 };
 use thiserror::Error;
 
@@ -26,7 +26,7 @@ use crate::allocation;
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
 pub use crate::sums::{FilmPixel, SumFormat};
 
-/// Maximum number of pixels of a film, 2^28. They take 15 GiB, or up to 59 GiB with optional contents.
+/// Maximum number of pixels of a film, 2^28. They take 15 GiB, or up to 83 GiB with optional contents.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.
@@ -137,6 +137,8 @@ pub struct Film {
     format: SumFormat,
     /// Position of the scene's origin in the coordinates of its file, metres.
     origin: [f64; 3],
+    /// Names of the light groups, one for each in the format.
+    light_groups: Vec<String>,
     /// Encoded sums of the pixels, row by row.
     records: Vec<u8>,
     written: Vec<bool>,
@@ -155,8 +157,9 @@ impl Film {
         let records = allocation::zeros(bytes).map_err(|_| too_large)?;
         allocation::check(count as u64).map_err(|_| too_large)?;
         let written = vec![false; count];
+        let light_groups = (1..=format.form.light_groups).map(|group| group.to_string()).collect();
         let origin = [0.0; 3];
-        Ok(Self { width, height, window, format, origin, records, written, missing: count })
+        Ok(Self { width, height, window, format, origin, light_groups, records, written, missing: count })
     }
 
     /// Checks that a film can be created, before its memory is allocated. Returns its number of pixels.
@@ -189,6 +192,18 @@ impl Film {
         self.origin = origin;
     }
 
+    /// Names of the light groups: their numbers from 1 unless they were set.
+    pub fn light_groups(&self) -> &[String] {
+        &self.light_groups
+    }
+
+    /// Sets the names of the light groups, as many as the format has; others have no effect.
+    pub fn set_light_groups(&mut self, names: &[String]) {
+        if names.len() == self.light_groups.len() {
+            self.light_groups = names.to_vec();
+        }
+    }
+
     /// Restricts an empty film to the samples that `base` lacks, so that only these are rendered.
     ///
     /// # Errors
@@ -215,7 +230,7 @@ impl Film {
     /// [`FilmError::Memory`].
     pub fn empty_with(&self, first: u32, samples: u32) -> Result<Self, FilmError> {
         let film = Self::new(self.width, self.height, self.window, self.format.of_part(first, samples))?;
-        Ok(Self { origin: self.origin, ..film })
+        Ok(Self { origin: self.origin, light_groups: self.light_groups.clone(), ..film })
     }
 
     /// Excludes samples before number `first` from an empty film.
@@ -241,7 +256,7 @@ impl Film {
     /// Sums of the pixels of the crop window, row by row from the top.
     pub fn sums(&self) -> impl ExactSizeIterator<Item = PixelSums> + Clone {
         let records = self.records.chunks_exact(self.format.record_bytes());
-        records.map(|record| PixelSums::read(record).unwrap_or_default())
+        records.map(|record| PixelSums::read(self.format.form, record).unwrap_or_default())
     }
 
     /// Values of the pixels in the crop window, row by row from the top.
@@ -268,7 +283,7 @@ impl Film {
     pub fn sums_at(&self, x: u32, y: u32) -> Option<PixelSums> {
         let bytes = self.format.record_bytes();
         let index = self.index(x, y)?;
-        PixelSums::read(&self.records[index * bytes..(index + 1) * bytes])
+        PixelSums::read(self.format.form, &self.records[index * bytes..(index + 1) * bytes])
     }
 
     /// Writes the sums of the pixel at `(x, y)` of the full picture, replacing earlier ones. Optional
@@ -295,12 +310,12 @@ impl Film {
     pub fn add(&mut self, more: &Self) -> Result<(), FilmError> {
         let format = self.format.plus(&more.format).filter(|_| self.window == more.window);
         self.format = format.ok_or(FilmError::Other)?;
-        let bytes = self.format.record_bytes();
+        let (bytes, form) = (self.format.record_bytes(), self.format.form);
         let records = self.records.chunks_exact_mut(bytes).zip(more.sums());
         for ((record, more_sums), (written, more_written)) in
             records.zip(self.written.iter_mut().zip(&more.written))
         {
-            store(&PixelSums::read(record).unwrap_or_default().plus(&more_sums), record);
+            store(&PixelSums::read(form, record).unwrap_or_default().plus(&more_sums), record);
             self.missing += usize::from(*written && !more_written);
             *written &= more_written;
         }

@@ -86,11 +86,13 @@ pub enum Layer {
     Object,
     /// Coverage by material, by the materials' names, as [Cryptomatte](crate::cryptomatte).
     Material,
+    /// Illuminance of the first surfaces that the eye rays meet, lx. It takes an irradiance frame of its own.
+    Illuminance,
 }
 
 impl Layer {
     /// All layers.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Direct,
         Self::Indirect,
         Self::Caustic,
@@ -102,6 +104,7 @@ impl Layer {
         Self::Position,
         Self::Object,
         Self::Material,
+        Self::Illuminance,
     ];
 
     /// Name of the layer in channel names and lists of layers.
@@ -118,11 +121,12 @@ impl Layer {
             Self::Position => "position",
             Self::Object => "object",
             Self::Material => "material",
+            Self::Illuminance => "illuminance",
         }
     }
 
-    /// Channels of the layer; none for the mattes, whose channels are not values of a [`FilmPixel`]
-    /// ([`crate::cryptomatte::Matte`]).
+    /// Channels of the layer; none for the mattes and illuminance, which are not values of a [`FilmPixel`]
+    /// ([`crate::cryptomatte::Matte`], [`crate::exr::Content`]).
     pub fn channels(self) -> &'static [Channel] {
         match self {
             Self::Direct => &DIRECT,
@@ -134,7 +138,7 @@ impl Layer {
             Self::Gathers => &GATHERS,
             Self::Alpha => &ALPHA,
             Self::Position => &POSITION,
-            Self::Object | Self::Material => &[],
+            Self::Object | Self::Material | Self::Illuminance => &[],
         }
     }
 
@@ -148,7 +152,7 @@ impl Layer {
         let plain = PixelForm::PLAIN;
         match self {
             Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers => PixelForm::LAYERED,
-            Self::Albedo | Self::Normal | Self::Depth => plain,
+            Self::Albedo | Self::Normal | Self::Depth | Self::Illuminance => plain,
             Self::Alpha => PixelForm { coverage: true, ..plain },
             Self::Position => PixelForm { position: true, ..plain },
             Self::Object | Self::Material => PixelForm { coverage: true, identities: true, ..plain },
@@ -177,9 +181,15 @@ impl Layers {
     /// No layers.
     pub const NONE: Self = Self(Vec::new());
 
-    /// All layers.
+    /// The layers, and `more`.
+    #[must_use]
+    pub fn with(&self, more: impl IntoIterator<Item = Layer>) -> Self {
+        self.and(&Self(more.into_iter().collect()))
+    }
+
+    /// All layers of one frame: without illuminance.
     pub fn all() -> Self {
-        Self(Layer::ALL.into())
+        Self(Layer::ALL.into()).of_one_frame()
     }
 
     /// The layers, each once.
@@ -194,9 +204,20 @@ impl Layers {
         Self(Layer::ALL.into_iter().filter(either).collect())
     }
 
-    /// All layers but the mattes.
+    /// All layers of one frame but the mattes.
     pub fn without_mattes() -> Self {
-        Self(Layer::ALL.into_iter().filter(|layer| !layer.form().identities).collect())
+        Self(Self::all().iter().filter(|layer| !layer.form().identities).collect())
+    }
+
+    /// Returns whether a layer is illuminance.
+    pub fn have_illuminance(&self) -> bool {
+        self.0.contains(&Layer::Illuminance)
+    }
+
+    /// The layers without illuminance.
+    #[must_use]
+    pub fn of_one_frame(&self) -> Self {
+        Self(self.iter().filter(|layer| *layer != Layer::Illuminance).collect())
     }
 
     /// Optional contents of pixels that the layers need: those that chips send only on request.
@@ -255,7 +276,7 @@ impl FromStr for Layers {
         }
         for name in text.split(',') {
             if !Layer::ALL.iter().any(|layer| layer.name() == name) {
-                let names = Self::all();
+                let names = Self(Layer::ALL.into());
                 return Err(format!(
                     "{name:?} is no layer; give some of {names}, with commas between them, or all, or none"
                 ));

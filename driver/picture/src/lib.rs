@@ -21,6 +21,7 @@ pub mod choice;
 pub mod cryptomatte;
 pub mod difference;
 pub mod exr;
+pub mod false_color;
 pub mod film;
 pub mod foreign;
 pub mod heading;

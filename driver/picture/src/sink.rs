@@ -21,7 +21,8 @@ impl FinishedTile {
     pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
         let mut all = records.chunks_exact(format.record_bytes());
-        let are_valid = records.len() as u64 == bytes && all.all(|record| PixelSums::read(record).is_some());
+        let are_valid =
+            records.len() as u64 == bytes && all.all(|record| PixelSums::read(format.form, record).is_some());
         are_valid.then_some(Self { tile, records, format, counters })
     }
 
@@ -55,7 +56,8 @@ impl FinishedTile {
     /// Column, row and sums of each pixel.
     pub fn sums(&self) -> impl Iterator<Item = ((u32, u32), PixelSums)> {
         let records = self.records.chunks_exact(self.format.record_bytes());
-        pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
+        pixel_positions(&self.tile)
+            .zip(records.map(|record| PixelSums::read(self.format.form, record).unwrap_or_default()))
     }
 
     /// Returns whether any pixel is dazzling ([`SumFormat::is_dazzling`]).

@@ -1,5 +1,6 @@
 //! Format of the sums of pixels, and the values that they represent.
 
+use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{
     FrameParameters, Pixel, PixelForm, PixelLayers, PixelSums, SampleCount, SumScale,
@@ -37,6 +38,8 @@ pub struct FilmPixel {
     /// Mean position of the surfaces that the samples see, metres; zero if none is seen, and in a film
     /// without positions.
     pub position: [f32; 3],
+    /// Light of each light group, W/(sr m^2); zero for groups that the film does not have.
+    pub light_groups: [[f32; 3]; MAX_LIGHT_GROUPS],
 }
 
 impl SumFormat {
@@ -47,7 +50,9 @@ impl SumFormat {
     /// Format of a frame of the card image with the header `header`.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
         let is_adaptive = frame.adaptive_threshold.is_some();
-        Self::of_range(frame.form(), (frame.first_sample, frame.samples), is_adaptive, header.sum_scale())
+        let scale = header.sum_scale();
+        let scale = if frame.irradiance { scale.of_irradiance() } else { scale };
+        Self::of_range(frame.form(), (frame.first_sample, frame.samples), is_adaptive, scale)
     }
 
     /// Format of `samples` samples from number `first` on, with or without adaptive sampling.
@@ -86,6 +91,7 @@ impl SumFormat {
             layers: sums.pixel_layers(self.count(), &self.scale).unwrap_or_default(),
             alpha: sums.alpha(self.count()),
             position: sums.mean_position(&self.scale).map_or([0.0; 3], place),
+            light_groups: sums.group_radiance(self.count(), &self.scale),
         }
     }
 
@@ -97,7 +103,8 @@ impl SumFormat {
         sums.light.into_iter().any(|light| light > most)
     }
 
-    /// Sums whose values are nearest to those of a pixel, without position, coverage and identities.
+    /// Sums whose values are nearest to those of a pixel, without light groups, position, coverage and
+    /// identities.
     pub fn sums(&self, FilmPixel { pixel, layers, .. }: &FilmPixel) -> PixelSums {
         let sums = PixelSums::nearest(pixel, self.count(), &self.scale);
         if self.form.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }

@@ -17,6 +17,8 @@ use thiserror::Error;
 
 use crate::choice::{Choice, choices};
 use crate::exr::{PROVENANCE, ascii};
+#[cfg(not(target_family = "wasm"))]
+use crate::false_color::ColourPicture;
 use crate::foreign;
 use crate::intact;
 #[cfg(not(target_family = "wasm"))]
@@ -149,6 +151,23 @@ pub fn write_png(
     Ok(output::write(path, &bytes)?)
 }
 
+/// Writes colours as a PNG, whole or not at all, with the JSON of the picture's provenance in the text chunk
+/// [`PROVENANCE`].
+///
+/// # Errors
+/// If the file cannot be written.
+#[cfg(not(target_family = "wasm"))]
+pub fn write_colours(
+    path: &Path,
+    picture: &ColourPicture,
+    provenance_json: Option<&str>,
+) -> Result<(), PngError> {
+    let texts = provenance_json.map(|json| (PROVENANCE, ascii(json))).into_iter().collect();
+    let encoded = encode_png(picture.size, picture.pixels.as_flattened(), png::ColorType::Rgb, texts);
+    let bytes = encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
+    Ok(output::write(path, &bytes)?)
+}
+
 /// Encodes the file that [`write_png`] writes. `path` is the file's name in errors.
 ///
 /// # Errors
@@ -254,7 +273,7 @@ fn encode_png(
 }
 
 /// Luminance of linear RGB by the weights of Rec. 709.
-fn luminance([red, green, blue]: [f32; 3]) -> f32 {
+pub fn luminance([red, green, blue]: [f32; 3]) -> f32 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 

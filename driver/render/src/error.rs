@@ -106,6 +106,15 @@ pub enum RenderError {
     #[error("the packed card image is malformed: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
+    /// A sensor is not possible.
+    #[error("sensor {number} is not possible: {reason}")]
+    #[diagnostic(help("correct the point, or leave it out"))]
+    Sensors {
+        /// Number of the sensor, from 1 on.
+        number: u64,
+        /// Reason why it is not possible.
+        reason: String,
+    },
     /// The last remaining card failed.
     #[error("{card}: {source}")]
     Card {
@@ -193,7 +202,12 @@ impl RenderError {
     /// Returns whether the cause of the error is in the settings, the scene or the files of the caller.
     pub fn is_input(&self) -> bool {
         match self {
-            Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
+            Self::Setting { .. }
+            | Self::Scene(_)
+            | Self::Film(_)
+            | Self::Pack(_)
+            | Self::Photons(_)
+            | Self::Sensors { .. } => true,
             Self::Partial(error) => !matches!(error, PartialError::File { .. }),
             Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
             Self::Card { source, .. } => matches!(source, CardError::Budget { .. }),

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod address;
+pub mod bake;
 mod card_thread;
 mod cards;
 mod chip;
@@ -15,6 +16,7 @@ pub mod display;
 pub mod emulator;
 mod error;
 mod greeting;
+pub mod measure;
 mod memory;
 mod noise;
 mod observer;

@@ -13,7 +13,7 @@ use photoncard_scene::Scene;
 
 use super::noise::NoiseEstimate;
 use super::renderer::{Chosen, Renderer, Rendering};
-use super::{Integrator, Observer, RenderError, RenderSettings};
+use super::{Integrator, Observer, Picture, RenderError, RenderSettings};
 
 /// Maximum number of samples per pixel, which all kinds of chips support.
 const MAX_SAMPLES: u32 = 4096;
@@ -84,7 +84,12 @@ impl Renderer {
             *chosen.borrow_mut() = (photons.clone(), integrator.clone());
             Ok((photons, integrator))
         };
-        let settings = settings.clone().with(|settings| settings.schedule.keep_records = true);
+        let layers = settings.picture.layers.clone();
+        let settings = settings.clone().with(|settings| {
+            settings.schedule.keep_records = true;
+            // Each pass is one frame, and illuminance another, after all passes.
+            settings.picture.layers = layers.of_one_frame();
+        });
         let rendering = self.render_chosen(scene, &settings, &first, observer)?;
         let (photons, integrator) = chosen.into_inner();
         let mut settings = RenderSettings { photons, integrator, ..settings };
@@ -119,6 +124,12 @@ impl Renderer {
             passes.count += 1;
             estimate.add(&before, &passes.rendering.film);
             passes.noise = estimate.noise();
+        }
+        if layers.have_illuminance() {
+            settings.integrator.samples = passes.rendering.statistics.samples;
+            self.add_illuminance(scene, &settings, &mut passes.rendering, observer)?;
+            let picture = Picture { layers, ..settings.picture.clone() };
+            passes.rendering.statistics.provenance.pixels.extend(picture.of_layers());
         }
         passes.rendering.statistics.time_s.total = start.elapsed().as_secs_f64();
         Ok(passes)

@@ -32,8 +32,7 @@ impl Provenance {
         budgets: &[Budget],
     ) -> Self {
         let mut pixels = settings.identity(scene);
-        // All layers of the picture. The identity has only the layers that chips send on request.
-        pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
+        pixels.extend(settings.picture.of_layers());
         // The distance in use, which is derived from the photons if none is stated.
         pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
         pixels.insert("view".to_owned(), view(camera));

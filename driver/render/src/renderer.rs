@@ -7,13 +7,18 @@ use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{PhotonSettings, check_image};
 use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::{Film, FilmError};
+use photoncard_picture::layer::Layers;
+use photoncard_picture::tone_mapping::luminance;
 use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
+use super::measure::Sensors;
 use super::outputs::Outputs;
 use super::work::{BudgetCheck, FitChips, Prepared, Times, Work, prepare};
-use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
+use super::{
+    Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics, TileOutputs,
+};
 use crate::partial::{PartialRender, PartialSettings};
 
 /// A finished picture.
@@ -22,6 +27,8 @@ pub struct Rendering {
     pub film: Film,
     /// Names for the picture's mattes; `None` for a picture without mattes.
     pub identities: Option<Arc<Identities>>,
+    /// Illuminance of the picture's pixels, lx, row by row; `None` for a picture without that layer.
+    pub illuminance: Option<Vec<f32>>,
     /// Statistics of the work.
     pub statistics: Statistics,
     /// File of finished tiles. The caller should remove it after writing the picture.
@@ -33,6 +40,17 @@ pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
 
 /// Function that chooses the settings of photons and integrator for a packed scene.
 type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
+
+/// Inputs of a picture besides scene and settings.
+#[derive(Default)]
+struct Request<'a> {
+    /// Choice of the settings of photons and integrator for the packed scene.
+    choose: Option<Choice<'a>>,
+    /// Film of earlier samples, to which samples are added.
+    base: Option<Arc<Film>>,
+    /// Sensors that are the picture's pixels; `None` for a picture that a camera sees.
+    sensors: Option<&'a Sensors>,
+}
 
 /// Renders pictures one after another on the same cards, which stay open between pictures.
 ///
@@ -67,7 +85,7 @@ impl Renderer {
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, None, None, observer)
+        self.render_by(scene, settings, Request::default(), observer)
     }
 
     /// Adds samples to the picture `base`. Renders the samples that `base` lacks, and returns the picture
@@ -85,7 +103,7 @@ impl Renderer {
         base: Arc<Film>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, None, Some(base), observer)
+        self.render_by(scene, settings, Request { base: Some(base), ..Request::default() }, observer)
     }
 
     /// Closes the cards. The next picture connects to them again, including lost ones.
@@ -105,18 +123,32 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Some(choose), None, observer)
+        self.render_by(scene, settings, Request { choose: Some(choose), ..Request::default() }, observer)
+    }
+
+    /// Renders a picture whose pixels are sensors.
+    ///
+    /// # Errors
+    /// As [`Self::refine`].
+    pub(super) fn render_sensors(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        (sensors, base): (&Sensors, Option<Arc<Film>>),
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        let request = Request { sensors: Some(sensors), base, ..Request::default() };
+        self.render_by(scene, settings, request, observer)
     }
 
     fn render_by(
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
-        choose: Option<Choice>,
-        base: Option<Arc<Film>>,
+        request: Request,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        let result = self.render_on_cards(scene, settings, choose, base, observer);
+        let result = self.render_on_cards(scene, settings, request, observer);
         if matches!(&result, Err(error) if !error.is_input() && !matches!(error, RenderError::Stopped)) {
             self.cards = None;
         }
@@ -127,11 +159,11 @@ impl Renderer {
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
-        choose: Option<Choice>,
-        base: Option<Arc<Film>>,
+        Request { choose, base, sensors }: Request,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
         let start = Instant::now();
+        settings.check_groups_of(scene)?;
         let camera = settings.camera(scene)?;
         settings.check()?;
         let Self { cards, kept } = self;
@@ -147,7 +179,9 @@ impl Renderer {
         settings.check()?;
         settings.check_budgets(&cards.budgets())?;
         // A film may be large: it is allocated after the settings are checked.
-        let mut film = settings.film(source.sum_scale())?;
+        let scale = sensors.map_or(source.sum_scale(), |sensors| sensors.scale(source.sum_scale()));
+        let is_irradiance = settings.picture.irradiance;
+        let mut film = settings.film(if is_irradiance { scale.of_irradiance() } else { scale })?;
         film.set_origin(scene.offset.to_array());
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
@@ -155,12 +189,20 @@ impl Renderer {
         let fit = &mut |check: BudgetCheck| cards.leave_out(check, needed, observer);
         let made = source.prepare(scene, settings, fit, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
+        let (image, camera_of_frame) = match sensors {
+            None => (&prepared.image, settings.frame_camera(&camera)),
+            Some(sensors) => {
+                let (image, camera) = sensors.placed_in(&prepared.image)?;
+                cards.leave_out(&|budget| Ok(check_image(image, budget)?), needed, observer)?;
+                (image, camera)
+            }
+        };
         let frame = FrameParameters {
+            camera: camera_of_frame,
             first_sample: outputs.base.as_ref().map_or(0, |base| base.format().samples),
             samples: film.format().samples,
             ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
         };
-        let image = &prepared.image;
         cards.leave_out(&|budget| settings.check_waiting_room(&frame, image, budget), needed, observer)?;
         let film = Mutex::new(film);
         let sinks = outputs.sinks(&film);
@@ -182,7 +224,42 @@ impl Renderer {
         let partial = outputs.finish(&film);
         let identities = kept.as_ref().and_then(|kept| kept.prepared.identities.clone());
         let identities = identities.filter(|_| settings.picture.layers.have_mattes());
-        Ok(Rendering { film, identities, statistics, partial })
+        let mut rendering = Rendering { film, identities, illuminance: None, statistics, partial };
+        if settings.picture.layers.have_illuminance() {
+            self.add_illuminance(scene, settings, &mut rendering, observer)?;
+        }
+        Ok(rendering)
+    }
+
+    /// Renders the layer of illuminance with the settings of a finished picture: an irradiance frame on the
+    /// same cards. Its times are added to those of the picture.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub(super) fn add_illuminance(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        rendering: &mut Rendering,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let lumens = settings.picture.lumens_per_watt.unwrap_or(scene.lumens_per_watt());
+        let is_irradiance = settings.picture.irradiance;
+        let settings = settings.clone().with(|settings| {
+            settings.picture.irradiance = true;
+            settings.picture.layers = Layers::NONE;
+            settings.schedule.keep_records = false;
+            settings.outputs = TileOutputs::default();
+        });
+        let of_film = |film: &Film| film.pixels().map(|pixel| lumens * luminance(pixel.radiance)).collect();
+        if is_irradiance {
+            rendering.illuminance = Some(of_film(&rendering.film));
+            return Ok(());
+        }
+        let of_irradiance = self.render_on_cards(scene, &settings, Request::default(), observer)?;
+        rendering.illuminance = Some(of_film(&of_irradiance.film));
+        rendering.statistics.time_s += of_irradiance.statistics.time_s;
+        Ok(())
     }
 }
 

@@ -9,6 +9,7 @@ use crate::camera::Camera;
 use crate::environment::Environment;
 use crate::instance::Instance;
 use crate::light::PunctualLight;
+use crate::light_groups::{LightGroups, LightSource};
 use crate::material::Material;
 use crate::texture::{Image, Texture};
 use crate::triangle::{CornerTangents, Triangle, VertexAttributes};
@@ -41,6 +42,13 @@ pub struct SceneContents {
     pub images: Vec<Image>,
     /// Point, spot and directional lights (`KHR_lights_punctual`).
     pub lights: Vec<PunctualLight>,
+    /// True if all light is in watts: the file's lights were converted from lumens. Otherwise numbers are as
+    /// in the file, for which glTF states candela, lux and cd/m^2.
+    pub is_in_watts: bool,
+    /// Light groups of the materials, lights and environment; none unless they are requested.
+    pub light_groups: LightGroups,
+    /// Light groups that the file states, by source.
+    pub stated_light_groups: Vec<(LightSource, String)>,
     /// Environment light from infinitely far; `None` in a scene from a glTF file.
     pub environment: Option<Environment>,
     /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
@@ -137,6 +145,9 @@ impl SceneContents {
         }
         if let Some(map) = self.environment.as_ref().filter(|map| map.strength != 1.0) {
             let _ = write!(text, "{:?}", map.strength);
+        }
+        if !self.light_groups.names().is_empty() {
+            let _ = write!(text, "{:?}", self.light_groups);
         }
         text
     }

@@ -199,6 +199,23 @@ pub enum SceneError {
         remedy: &'static str,
     },
 
+    /// Error of a photometric file.
+    #[error("{}, line {line}: {reason}", file.display())]
+    #[diagnostic(
+        code(scene::profile),
+        help(
+            "photometric files are ANSI/IES LM-63 (.ies) and EULUMDAT (.ldt); download the luminaire's file again"
+        )
+    )]
+    Profile {
+        /// Path of the file.
+        file: PathBuf,
+        /// Line of the fault, from 1 on.
+        line: usize,
+        /// Description of the fault.
+        reason: String,
+    },
+
     /// Error of a vertex attribute that is out of range or not finite.
     #[error("{location}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
     #[diagnostic(code(scene::vertex), help("repair the mesh in the modelling tool and export it again"))]

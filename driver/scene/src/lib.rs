@@ -14,18 +14,22 @@ pub mod gltf;
 mod instance;
 mod layers;
 mod light;
+mod light_groups;
 mod light_units;
 mod limits;
 mod map_size;
 mod material;
 mod meshopt;
+mod nearest;
 mod out_of_range;
 mod parts;
+mod photometry;
 mod placed;
 mod radiance;
 mod raster;
 mod reduction;
 mod settings;
+mod sky;
 mod srgb;
 mod texture;
 mod triangle;
@@ -41,12 +45,16 @@ pub use self::contents::{Concern, SceneContents};
 pub use self::environment::Environment;
 pub use self::instance::Instance;
 pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
-pub use self::light::{PunctualKind, PunctualLight};
+pub use self::light::{LightAxes, PunctualKind, PunctualLight};
+pub use self::light_groups::{LightGroups, LightSource};
 pub use self::light_units::LightUnits;
 pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::parts::{Part, parts};
+pub use self::photometry::LightProfile;
+pub use self::settings::profile_of;
+pub use self::sky::{Daylight, NoSky, Sky};
 pub use self::texture::shared_exponent;
 pub use self::texture::{Encoding, Image, MAX_SIDE, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
@@ -110,20 +118,30 @@ impl Scene {
         self
     }
 
-    /// Creates a scene that has cameras and an offset, but no triangles. Its methods return the given values:
-    /// `checksum`, `checksum_without_cameras` and `checksum_of_objects` those in `checksums`,
-    /// [`Self::is_specular`] the last argument.
+    /// Creates a scene that has cameras, an offset and names of light groups, but no triangles. Its methods
+    /// return the given values: `checksum`, `checksum_without_cameras` and `checksum_of_objects` those in
+    /// `checksums`, [`Self::is_specular`] the first of the last argument, whose other is
+    /// [`SceneContents::is_in_watts`].
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,
+        light_groups: Vec<String>,
         checksums: [String; 3],
-        is_specular: bool,
+        [is_specular, is_in_watts]: [bool; 2],
     ) -> Self {
         let [checksum, without_cameras, objects] = checksums.map(OnceLock::from);
-        let contents = SceneContents { cameras, offset, ..SceneContents::default() };
+        let light_groups = LightGroups::of_names(light_groups);
+        let contents =
+            SceneContents { cameras, offset, is_in_watts, light_groups, ..SceneContents::default() };
         let is_specular = is_specular.into();
         let known = Known { checksum, without_cameras, objects, is_specular, ..Known::default() };
         Self { contents, known }
+    }
+
+    /// Luminous efficacy by which the scene's irradiances become illuminances, lm/W: 683 for light in watts,
+    /// 1 for light in the photometric units of glTF.
+    pub fn lumens_per_watt(&self) -> f32 {
+        if self.is_in_watts { light_units::EFFICACY } else { 1.0 }
     }
 
     /// Replaces the cameras, and keeps the checksums that do not depend on them.

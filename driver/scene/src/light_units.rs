@@ -3,7 +3,7 @@
 use photoncard_picture::choice::choices;
 
 /// Luminous efficacy by which Blender's exporter converts watts to lumens, lm/W.
-const EFFICACY: f32 = 683.0;
+pub(super) const EFFICACY: f32 = 683.0;
 
 /// Units in which a file states punctual lights (`KHR_lights_punctual`).
 ///
@@ -35,6 +35,11 @@ choices!(LightUnits {
 });
 
 impl LightUnits {
+    /// Returns true if lights are converted to watts.
+    pub(super) fn are_converted(self) -> bool {
+        matches!(self, Self::Photometric | Self::Watts)
+    }
+
     /// Divisor that converts the intensity of a point or spot light to W/sr.
     pub(super) fn points(self) -> f32 {
         match self {

@@ -12,7 +12,7 @@ pub struct Part {
     /// Indices of the part's triangles, ascending.
     pub triangles: Vec<u32>,
     /// True if every edge is traversed equally often in both directions, so that the part bounds a solid.
-    pub(crate) is_closed: bool,
+    pub is_closed: bool,
 }
 
 /// Edge between two vertices: the bits of their coordinates, the lesser vertex first.

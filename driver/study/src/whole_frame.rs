@@ -6,11 +6,11 @@
 //! Gathers of irradiance records stay on the chips, because their results are needed before the gathers of
 //! pixels.
 
-use glam::Vec3;
-use photoncard_firmware::chip::{Component, PixelView};
+use photoncard_firmware::chip::{Component, PixelView, add_light};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::kind::ReferenceCandidates;
+use photoncard_firmware::light_groups::GroupedLight;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_map::pack::CardImage;
@@ -20,7 +20,6 @@ use photoncard_render::RenderError;
 use photoncard_render::emulator::direct::{RenderedTile, render_tile_of};
 use photoncard_render::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_render::emulator::{EmulatedChip, EmulatedKind, Measured};
-use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelSums, Tile};
 use rayon::ThreadPool;
@@ -37,8 +36,8 @@ const GATHERS_PER_TASK: usize = 1 << 22;
 /// A gather that waits for its turn along the curve.
 #[derive(Clone, Copy)]
 struct Waiting {
-    /// Index in [`Frame::sums`] of the sum to which the result is added.
-    sum: u32,
+    /// Index in [`Frame::sums`] of the first sum of the pixel to which the result is added.
+    sums: u32,
     request: GatherRequest,
 }
 
@@ -105,6 +104,7 @@ impl WholeFrame<'_> {
         let &Self { frame, tiles, pool, .. } = self;
         let mut all = Frame::with_room_for(frame, tiles)?;
         let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
+        let of_pixel = frame.form().sums_of_light() as usize;
         let chips = pool.current_num_threads();
         let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
         for tiles in tiles.chunks(tiles_per_round) {
@@ -120,8 +120,9 @@ impl WholeFrame<'_> {
             for Gathered { brought, counters, traffic } in parts.map_err(RenderError::Image)? {
                 all.counters.add(&counters);
                 all.traffic.add(&traffic);
-                for (sum, brought) in brought {
-                    all.sums[sum as usize].add_light(brought);
+                for (first, brought) in brought {
+                    let sums = &mut all.sums[first as usize..][..of_pixel];
+                    add_light(frame, sums, Component::Indirect, &brought);
                 }
             }
         }
@@ -152,8 +153,8 @@ impl WholeFrame<'_> {
             Context { scene: &scene, memory: &mut memory, frame: self.frame, counters: &mut counters };
         let mut candidates = ReferenceCandidates::new();
         let mut brought = Vec::with_capacity(waiting.len());
-        for Waiting { sum, request, .. } in waiting {
-            brought.push((*sum, gathered(&mut context, request, candidates.view())?));
+        for Waiting { sums, request, .. } in waiting {
+            brought.push((*sums, gathered(&mut context, request, candidates.view())?));
         }
         Ok(Gathered { brought, counters, traffic: memory.traffic() })
     }
@@ -162,11 +163,12 @@ impl WholeFrame<'_> {
     fn finished(&self, all: &Frame) -> Result<Vec<FinishedTile>, Fault> {
         let (scene, _) = self.image.view();
         let format = SumFormat::new(&scene.header, self.frame);
-        let sums_of_pixel = sums_of_pixel(self.frame.layers) as usize;
+        let form = self.frame.form();
+        let sums_of_pixel = form.sums_of_light() as usize;
         let mut pixels = all.views.iter().zip(all.sums.chunks_exact(sums_of_pixel));
         let finish = |tile: &Tile| {
             let of_tile = pixels.by_ref().take(tile.pixels() as usize);
-            let sums: Vec<PixelSums> = of_tile.map(|(view, light)| view.sums(light)).collect();
+            let sums: Vec<PixelSums> = of_tile.map(|(view, light)| view.sums(form, light)).collect();
             FinishedTile::of_pixels(*tile, sums, format)
                 .ok_or(Fault { code: FaultCode::Tile, detail: tile.id })
         };
@@ -199,7 +201,7 @@ impl Frame {
     fn with_room_for(frame: &FrameParameters, tiles: &[Tile]) -> Result<Self, RenderError> {
         let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
         let gathers = pixels * rays_of_pixel(frame);
-        let sums = pixels * u64::from(sums_of_pixel(frame.layers));
+        let sums = pixels * u64::from(frame.form().sums_of_light());
         if gathers > MAX_GATHERS || sums > u32::MAX as u64 {
             return Err(too_many(gathers));
         }
@@ -230,9 +232,10 @@ impl Frame {
             self.views.extend(tile.views);
             self.counters.add(&tile.counters);
             self.traffic.add(&tile.traffic);
-            let sum_of = |pixel: u32| first + Component::Indirect.sum_of(frame, pixel as usize) as u32;
+            let of_pixel = frame.form().sums_of_light();
             let waiting = waiting.into_iter();
-            self.waiting.extend(waiting.map(|(pixel, request)| Waiting { sum: sum_of(pixel), request }));
+            self.waiting
+                .extend(waiting.map(|(pixel, request)| Waiting { sums: first + pixel * of_pixel, request }));
         }
         Ok(())
     }
@@ -240,8 +243,8 @@ impl Frame {
 
 /// Results of some gathers.
 struct Gathered {
-    /// Light of each gather, with the index in [`Frame::sums`] of the sum to which it is added.
-    brought: Vec<(u32, Vec3)>,
+    /// Light of each gather, with the index in [`Frame::sums`] of the first sum of its pixel.
+    brought: Vec<(u32, GroupedLight)>,
     counters: Counters,
     traffic: MemoryTraffic,
 }

@@ -45,8 +45,16 @@ fn lights_are_placed_and_turned_by_their_nodes() {
 
     let sun = lit(&json!({"type": "directional"})).unwrap();
     assert_eq!((sun.lights[0].name.as_str(), sun.lights[0].intensity), ("light 0", Vec3::ONE));
-    let PunctualKind::Directional { direction } = sun.lights[0].kind else { panic!("{sun:?}") };
+    let PunctualKind::Directional { direction, angle: 0.0 } = sun.lights[0].kind else { panic!("{sun:?}") };
     close(direction, Vec3::NEG_X);
+    let wide = lit(&json!({"type": "directional", "extras": {"photoncard": {"angle": 90}}})).unwrap();
+    let angle = std::f32::consts::FRAC_PI_2;
+    assert_eq!(wide.lights[0].kind, PunctualKind::Directional { direction, angle });
+    for (extras, said) in [(json!({"angle": -1}), "-1"), (json!({"angle": "wide"}), "string")] {
+        let extras = json!({"photoncard": extras});
+        let error = lit(&json!({"type": "directional", "extras": extras})).unwrap_err().to_string();
+        assert!(error.contains("lights[0].extras.photoncard") && error.contains(said), "{error}");
+    }
 
     let spot =
         lit(&json!({"type": "spot", "spot": {"innerConeAngle": 0.25, "outerConeAngle": 0.5}})).unwrap();

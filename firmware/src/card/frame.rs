@@ -1,11 +1,12 @@
 //! Checks a frame's parameters.
 
-use photoncard_shared::budget::{Budget, MAX_BINS};
+use photoncard_shared::budget::{Budget, MAX_BINS, MAX_LIGHT_GROUPS};
 use photoncard_shared::image::{Header, SectionKind};
-use photoncard_shared::layout::LEAF_TRIANGLES;
-use photoncard_shared::message::{Drain, Fault, FrameParameters, Parameter, Radiance};
+use photoncard_shared::layout::{LEAF_TRIANGLES, Record, Sensor};
+use photoncard_shared::message::{Drain, Fault, FrameParameters, Parameter, Projection, Radiance};
 
 use crate::chip::least_waiting_lines;
+use crate::irradiance_cache::MIN_RECORDS;
 
 /// Checks a frame's parameters against the budget, the card image and the number `lines` of lines of card
 /// memory.
@@ -27,7 +28,7 @@ pub(super) fn check_frame(
     let checks = [
         (Parameter::Width, within(frame.width, MAX_PICTURE_SIDE)),
         (Parameter::Height, within(frame.height, MAX_PICTURE_SIDE)),
-        (Parameter::Camera, frame.camera.is_finite()),
+        (Parameter::Camera, frame.camera.is_finite() && has_sensors(header, frame)),
         (Parameter::FirstSample, frame.first_sample < budget.samples),
         (Parameter::Samples, frame.samples > 0 && last_sample <= budget.samples),
         (Parameter::PlannedSamples, within(frame.planned_samples, budget.samples)),
@@ -43,6 +44,7 @@ pub(super) fn check_frame(
         (Parameter::InFlight, frame.in_flight >= 1),
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
         (Parameter::Identities, !frame.identities || has_identities(header)),
+        (Parameter::LightGroups, has_light_groups(budget, header, frame)),
         (
             Parameter::Caustics,
             frame
@@ -54,6 +56,26 @@ pub(super) fn check_frame(
         Some((parameter, _)) => Err(parameter.fault()),
         None => Ok(()),
     }
+}
+
+/// Returns true if the card image has the lines of a frame's sensors, and the frame does nothing that sensors
+/// cannot do: they belong to no triangle, and see no neighbours between which irradiance is interpolated.
+fn has_sensors(header: &Header, frame: &FrameParameters) -> bool {
+    let Projection::Sensors { line, count, .. } = frame.camera.projection else { return true };
+    let end = line.checked_add(count.div_ceil(Sensor::PER_LINE as u32));
+    end.is_some_and(|end| end <= header.lines) && frame.irradiance_error.is_none() && !frame.identities
+}
+
+/// Returns true if a chip and a card image have what the light groups of a frame need: irradiance records for
+/// each group of a block of one pixel, and photons with groups, which neither kd-trees nor irradiance points
+/// have.
+fn has_light_groups(budget: &Budget, header: &Header, frame: &FrameParameters) -> bool {
+    let groups = frame.light_groups as usize;
+    let has_records =
+        frame.irradiance_error.is_none() || groups * MIN_RECORDS <= budget.irradiance_records as usize;
+    let has_photons =
+        header.section(SectionKind::Photons).records == 0 && frame.radiance == Radiance::Density;
+    groups == 0 || groups <= MAX_LIGHT_GROUPS && has_records && has_photons
 }
 
 fn is_irradiance_error(error: f32) -> bool {

@@ -22,6 +22,7 @@ use super::position::{Pass, Position};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{FirstHit, Sight, View};
 use crate::render::features::{Features, features};
@@ -144,10 +145,12 @@ impl<K: ChipKind> Flight<K> {
         let paths = self.paths(pixel).of_sample(completion.sample);
         let pass = self.pass();
         let context = &mut job.context(&mut self.counters);
+        let groups = LightGroups::of(context.frame);
         let has_rays = match eye::view(context, at)? {
             Sight::Background { radiance, hit } => {
                 let light = radiance * per_unit(context);
-                completion.add(context.frame, as_what, Component::Direct, light);
+                let light = groups.light(context.scene.header.lights.light_group, light);
+                completion.add(context.frame, as_what, Component::Direct, &light);
                 if let Some((depth, first)) = hit
                     && let Use::Term(weight) = as_what
                 {
@@ -189,10 +192,10 @@ impl Completion {
     }
 
     /// Adds light of the current path, in the card image's radiance units.
-    fn add(&mut self, frame: &FrameParameters, as_what: Use, component: Component, light: Vec3) {
-        self.of_path += light;
+    fn add(&mut self, frame: &FrameParameters, as_what: Use, component: Component, light: &GroupedLight) {
+        self.of_path += light.total(LightGroups::of(frame));
         if let Use::Term(weight) = as_what {
-            self.light.add(frame, component, light * weight);
+            self.light.add(frame, component, &(*light * weight));
         }
     }
 
@@ -253,7 +256,8 @@ fn light_path<K: ChipKind, M: MemoryPort>(
     let per_unit = per_unit(context);
     let surface = &view.surface;
     let is_term = matches!(as_what, Use::Term(_));
-    completion.add(frame, as_what, Component::Direct, surface.emission * per_unit);
+    let emission = LightGroups::of(frame).light(surface.light_group, surface.emission * per_unit);
+    completion.add(frame, as_what, Component::Direct, &emission);
     let allowed = allowed_error_at(frame, view);
     let interpolated = allowed.and_then(|allowed| cache.interpolate(&seen_sample(at, view), allowed));
     if is_term {
@@ -262,8 +266,8 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         completion.interpolated += u32::from(interpolated.is_some());
     }
     if let Some(irradiance) = interpolated {
-        let reflected = surface.reflector().lambertian_albedo() * irradiance;
-        completion.add(frame, as_what, Component::Indirect, reflected * per_unit);
+        let reflected = irradiance * surface.reflector().lambertian_albedo() * per_unit;
+        completion.add(frame, as_what, Component::Indirect, &reflected);
     }
     let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
     let mut point = pixel_point(frame, at, view, purpose, paths);
@@ -285,7 +289,7 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         eye::surface(context, &view.sample, seen, &mut point.surface)?;
     }
     for (component, light) in direct_light(context, at, &point)? {
-        completion.add(frame, as_what, component, light);
+        completion.add(frame, as_what, component, &light);
     }
     Ok(has_rays)
 }

@@ -3,12 +3,12 @@
 use glam::Vec3;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{
-    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, FrameParameters, IdentityCoverage, LayerSums, NORMAL_STEPS,
+    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, FrameParameters, IdentityCoverage, NORMAL_STEPS, PixelForm,
     PixelSums,
 };
 
 use super::adaptive::Probes;
-use super::light::PixelLight;
+use super::light::{PixelLight, with_light};
 use crate::fixed_point::ColourSum;
 use crate::render::features::Features;
 
@@ -28,7 +28,7 @@ pub struct FinishedPixel {
 impl FinishedPixel {
     /// Sums of the pixel as a card sends them to its host.
     pub fn sums(&self, frame: &FrameParameters) -> PixelSums {
-        self.view.sums(self.light.sums(frame))
+        self.view.sums(frame.form(), self.light.sums(frame))
     }
 }
 
@@ -40,9 +40,9 @@ pub struct PixelView {
 }
 
 impl PixelView {
-    /// Combines the sums with sums of light. With layers, `light` is a sum for each component, then the count
-    /// of gathers. Without layers it is a single sum.
-    pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
+    /// Combines the sums with sums of light, in the order of the layers of light, of a frame whose pixels
+    /// have the contents `form`.
+    pub fn sums(&self, form: PixelForm, light: &[ColourSum]) -> PixelSums {
         let SeenSums { albedo, normal, depth, surfaces } = self.seen;
         let FurtherSums { position, coverage, identities } = self.further;
         let view = PixelSums {
@@ -55,14 +55,7 @@ impl PixelView {
             identities,
             ..PixelSums::NOTHING
         };
-        match light {
-            [direct, indirect, caustic, gathers] => {
-                let [direct, indirect, caustic] = [direct, indirect, caustic].map(ColourSum::bits);
-                let gathers = gathers.value().x as u32;
-                view.with_layers(LayerSums { direct, indirect, caustic, gathers })
-            }
-            _ => view.with_light(light.first().map_or([0; 3], ColourSum::bits)),
-        }
+        with_light(view, form, light)
     }
 }
 

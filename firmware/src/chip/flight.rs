@@ -158,7 +158,7 @@ impl<K: ChipKind> Flight<K> {
             None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
             None => self.do_without_records()?,
             Some(_) if frame.keep_records => self.position = Position::at(Pass::ReadKept),
-            Some(_) => self.begin_records()?,
+            Some(_) => self.begin_records(frame)?,
         }
         Ok(())
     }

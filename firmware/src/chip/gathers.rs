@@ -1,12 +1,12 @@
 //! Photon gathers of a chip, done at once or queued for deferred reordering.
 
-use glam::Vec3;
 use photoncard_shared::budget::{MOST_GATHERS_OF_LINE, places_of_gathering};
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant};
 
 use super::rounds::Rounds;
 use crate::gather::{Buckets, GatherQueue, GatherRequest};
 use crate::kind::Capacity;
+use crate::light_groups::GroupedLight;
 use crate::memory::{MemoryPort, Room, Stage};
 use crate::photon::{CandidateStorage, Candidates};
 use crate::render::Context;
@@ -114,7 +114,7 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
         context: &mut Context<M>,
         rounds: &mut Rounds<W>,
         request: GatherRequest,
-    ) -> Result<Option<Vec3>, Fault> {
+    ) -> Result<Option<GroupedLight>, Fault> {
         if context.frame.drain == Drain::Buckets {
             let Some(room) = rounds.room_for_gather() else {
                 return self.gather(context, &request).map(Some);
@@ -162,7 +162,7 @@ impl<C: Capacity, Q: Capacity, B: Capacity> Gathers<C, Q, B> {
         &mut self,
         context: &mut Context<M>,
         request: &GatherRequest,
-    ) -> Result<Vec3, Fault> {
+    ) -> Result<GroupedLight, Fault> {
         gathered(context, request, self.candidates.view())
     }
 }

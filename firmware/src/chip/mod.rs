@@ -46,7 +46,7 @@ use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant, Tile}
 use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
 use self::flight::Flight;
-pub use self::light::{Component, PixelLight};
+pub use self::light::{Component, PixelLight, add_light};
 use self::pixel_sums::PixelSums;
 use self::points::Points;
 use self::position::{Pass, Position};
@@ -149,10 +149,11 @@ impl<K: ChipKind> Chip<K> {
         &self.kind
     }
 
-    /// Maximum number of pixels of a tile in `frame`: the number in the budget, or a fourth of it if the
-    /// frame has layers (separate sums of direct, indirect and caustic light).
+    /// Maximum number of pixels of a tile in `frame` ([`Budget::pixels_of_tile`]).
+    ///
+    /// [`Budget::pixels_of_tile`]: photoncard_shared::budget::Budget::pixels_of_tile
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
-        u64::from(self.kind.budget().pixels_of_tile(frame.layers))
+        u64::from(self.kind.budget().pixels_of_tile(frame.form().sums_of_light()))
     }
 
     /// Drops all tiles and their queued gathers.
@@ -395,9 +396,9 @@ impl<K: ChipKind> Chip<K> {
             let brought = shared.gathers.gather(&mut job.context(&mut flight.counters), &request)?;
             match point {
                 PointIndex::Pixel(pixel) => {
-                    shared.sums.add(job.frame, (number, pixel), Component::Indirect, brought)?;
+                    shared.sums.add(job.frame, (number, pixel), Component::Indirect, &brought)?;
                 }
-                PointIndex::Record(record) => flight.cache.add(record, request.target.cell(), brought)?,
+                PointIndex::Record(record) => flight.cache.add(record, request.target.cell(), &brought)?,
             }
         }
         Ok(())

@@ -6,15 +6,16 @@
 
 use core::num::NonZeroU32;
 
-use glam::Vec3;
-use photoncard_shared::budget::{MAX_IN_FLIGHT, sums_of_pixel};
+use photoncard_shared::budget::MAX_IN_FLIGHT;
 use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
-use super::light::{Component, PixelLight};
+use super::light::{Component, PixelLight, add_light};
 use crate::fixed_point::ColourSum;
 use crate::kind::{Buffer, Capacity};
+use crate::light_groups::GroupedLight;
 
-/// Ring buffer of sums, in the card image's radiance units, with [`sums_of_pixel`] sums for each pixel.
+/// Ring buffer of sums, in the card image's radiance units, with
+/// [`PixelForm::sums_of_light`](photoncard_shared::message::PixelForm::sums_of_light) sums for each pixel.
 pub(super) struct PixelSums<C: Capacity> {
     sums: C::Buffer<ColourSum>,
     runs: [Run; MAX_IN_FLIGHT as usize],
@@ -50,7 +51,7 @@ impl<C: Capacity> PixelSums<C> {
 
     /// Capacity of the ring in pixels, at least 1.
     fn places(&self, frame: &FrameParameters) -> NonZeroU32 {
-        NonZeroU32::new(self.sums.capacity() as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
+        NonZeroU32::new(self.sums.capacity() as u32 / frame.form().sums_of_light()).unwrap_or(NonZeroU32::MIN)
     }
 
     /// Begins an empty run, after all other runs, for the tile in flight with index `flight`.
@@ -82,7 +83,7 @@ impl<C: Capacity> PixelSums<C> {
     /// Appends a pixel without light to the run of the tile in flight with index `flight`. This run must be
     /// the last one begun, and [`Self::has_room`] must be true. Returns the pixel's number in the run.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
-        let (count, places) = (sums_of_pixel(frame.layers) as usize, self.places(frame));
+        let (count, places) = (frame.form().sums_of_light() as usize, self.places(frame));
         let first = self.end as usize * count;
         let sums = self.sums.values_mut().get_mut(first..first + count);
         let (sums, run) = sums.zip(self.runs.get_mut(flight)).ok_or(Invariant::Sums.fault())?;
@@ -106,11 +107,9 @@ impl<C: Capacity> PixelSums<C> {
         frame: &FrameParameters,
         (flight, number): (usize, u16),
         component: Component,
-        brought: Vec3,
+        brought: &GroupedLight,
     ) -> Result<(), Fault> {
-        let place = component.sum_of(frame, self.place(frame, flight, number)?);
-        let sum = self.sums.values_mut().get_mut(place).ok_or(Invariant::Sums.fault())?;
-        sum.add_light(brought);
+        add_light(frame, self.of_pixel(frame, (flight, number))?, component, brought);
         Ok(())
     }
 
@@ -120,12 +119,13 @@ impl<C: Capacity> PixelSums<C> {
     }
 
     /// Sums of pixel `number` in the run of a tile, mutable.
+    #[inline]
     pub(super) fn of_pixel(
         &mut self,
         frame: &FrameParameters,
         (flight, number): (usize, u16),
     ) -> Result<&mut [ColourSum], Fault> {
-        let count = sums_of_pixel(frame.layers) as usize;
+        let count = frame.form().sums_of_light() as usize;
         let first = self.place(frame, flight, number)? * count;
         self.sums.values_mut().get_mut(first..first + count).ok_or(Invariant::Sums.fault())
     }
@@ -136,7 +136,7 @@ impl<C: Capacity> PixelSums<C> {
         frame: &FrameParameters,
         (flight, number): (usize, u16),
     ) -> Result<PixelLight, Fault> {
-        let count = sums_of_pixel(frame.layers) as usize;
+        let count = frame.form().sums_of_light() as usize;
         let first = self.place(frame, flight, number)? * count;
         let sums = self.sums.values().get(first..first + count).ok_or(Invariant::Sums.fault())?;
         Ok(PixelLight::of(sums))
@@ -147,16 +147,24 @@ impl<C: Capacity> PixelSums<C> {
 mod tests {
     use std::vec::Vec;
 
+    use glam::Vec3;
+
     use super::*;
     use crate::chip::test_frame::frame;
     use crate::kind::Entries;
+    use crate::light_groups::LightGroups;
+
+    /// Light that differs in each group.
+    fn grouped(frame: &FrameParameters, light: f32) -> GroupedLight {
+        GroupedLight::of_groups(LightGroups::of(frame), |group| Vec3::splat(light + group as f32))
+    }
 
     /// Tiles begin and end in many orders. Each pixel must keep its own light, and all positions of the ring
     /// must be used again.
     #[test]
     fn every_pixel_of_every_tile_in_flight_has_a_sum_of_its_own() {
-        for layers in [false, true] {
-            let frame = &FrameParameters { layers, ..frame() };
+        for (layers, light_groups) in [(false, 0), (true, 0), (false, 3), (true, 4)] {
+            let frame = &FrameParameters { layers, light_groups, ..frame() };
             let mut sums = PixelSums::<Entries<24>>::new();
             let places = sums.places(frame).get() as u16;
             let mut held: [Vec<f32>; 3] = Default::default();
@@ -176,7 +184,7 @@ mod tests {
                     assert_eq!(sums.push(frame, flight), Ok(number as u16));
                     let light = (3 * step + number) as f32;
                     let added =
-                        sums.add(frame, (flight, number as u16), Component::Indirect, Vec3::splat(light));
+                        sums.add(frame, (flight, number as u16), Component::Indirect, &grouped(frame, light));
                     assert_eq!(added, Ok(()));
                     held[flight].push(light);
                 }
@@ -196,7 +204,7 @@ mod tests {
         for (flight, lights) in held.iter().enumerate() {
             for (number, &light) in (0..).zip(lights) {
                 let mut expected = PixelLight::NONE;
-                expected.add(frame, Component::Indirect, Vec3::splat(light));
+                expected.add(frame, Component::Indirect, &grouped(frame, light));
                 assert_eq!(sums.light(frame, (flight, number)), Ok(expected));
             }
         }

@@ -13,6 +13,7 @@ use super::stored_point::{StoredPoint, StoredRays, pattern};
 use crate::gather::PointIndex;
 use crate::irradiance_cache::{IrradianceCache, SeenSample};
 use crate::kind::{Capacity, ChipKind};
+use crate::light_groups::GroupedLight;
 use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::View;
 use crate::render::{
@@ -178,7 +179,7 @@ impl<K: ChipKind> Flight<K> {
         let mut point = stored.point(pattern(context.frame, at));
         stored.read_surface(context, at, &mut point.surface)?;
         for (component, light) in direct_light(context, at, &point)? {
-            shared.sums.add(context.frame, (flight, number), component, light * weight)?;
+            shared.sums.add(context.frame, (flight, number), component, &(light * weight))?;
         }
         if self.position.next_index(shared.points.len()) {
             self.position.pass = Pass::Rays;
@@ -216,7 +217,7 @@ impl<K: ChipKind> Flight<K> {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
                 let sum = (flight, number);
-                shared.sums.add(context.frame, sum, Component::Direct, end.direct)?;
+                shared.sums.add(context.frame, sum, Component::Direct, &end.direct)?;
                 match (end.request, outlet.as_deref_mut()) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
@@ -224,7 +225,7 @@ impl<K: ChipKind> Flight<K> {
                         match shared.gathers.submit(context, &mut shared.rounds, request)? {
                             None => self.waiting += 1,
                             Some(brought) => {
-                                shared.sums.add(context.frame, sum, Component::Indirect, brought)?;
+                                shared.sums.add(context.frame, sum, Component::Indirect, &brought)?;
                             }
                         }
                     }
@@ -259,7 +260,7 @@ pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,
     point: &GatherPoint,
-) -> Result<[(Component, glam::Vec3); 2], Fault> {
+) -> Result<[(Component, GroupedLight); 2], Fault> {
     let reflected = direct::reflected(context, at, point)?;
     let direct = reflected * per_unit(context);
     let caustic = caustic::reflected(context, point)?;

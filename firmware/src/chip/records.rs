@@ -1,6 +1,6 @@
 //! Passes of a block's irradiance records.
 
-use photoncard_shared::message::{Fault, Invariant};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
@@ -9,6 +9,7 @@ use super::stored_point::StoredPoint;
 use crate::gather::PointIndex;
 use crate::irradiance_cache::{Full, Recalled};
 use crate::kind::ChipKind;
+use crate::light_groups::LightGroups;
 use crate::memory::MemoryPort;
 use crate::render::{RenderJob, final_gather};
 
@@ -25,15 +26,15 @@ impl<K: ChipKind> Flight<K> {
                 self.position = Position::at(Pass::CompletePlain);
             }
             Recalled::TooMany => self.divide_block()?,
-            Recalled::Nothing => self.begin_records()?,
+            Recalled::Nothing => self.begin_records(job.frame)?,
         }
         Ok(())
     }
 
     /// Begins the survey, which places the block's irradiance records.
-    pub(super) fn begin_records(&mut self) -> Result<(), Fault> {
+    pub(super) fn begin_records(&mut self, frame: &FrameParameters) -> Result<(), Fault> {
         self.position = Position::at(Pass::Survey);
-        match self.cache.begin(&self.window()) {
+        match self.cache.begin(&self.window(), LightGroups::of(frame)) {
             Ok(()) => Ok(()),
             Err(Full) => self.divide_block(),
         }
@@ -110,11 +111,11 @@ impl<K: ChipKind> Flight<K> {
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
-                cache.add(record, end.cell, end.direct)?;
+                cache.add(record, end.cell, &end.direct)?;
                 if let Some(request) = end.request {
                     match gathers.submit(context, rounds, request)? {
                         None => *waiting += 1,
-                        Some(brought) => cache.add(record, end.cell, brought)?,
+                        Some(brought) => cache.add(record, end.cell, &brought)?,
                     }
                 }
             }

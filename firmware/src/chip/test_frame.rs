@@ -25,6 +25,7 @@ pub(super) fn frame() -> FrameParameters {
         radiance: Default::default(),
         caustics: None,
         layers: false,
+        light_groups: 0,
         filter: Default::default(),
         in_flight: 3,
         keep_records: false,
@@ -33,5 +34,6 @@ pub(super) fn frame() -> FrameParameters {
         position: false,
         coverage: false,
         identities: false,
+        irradiance: false,
     }
 }

@@ -83,25 +83,33 @@ impl LambertianRequest {
     }
 }
 
-/// Radiance that a gather has brought, and the sum to which it is added; 15 bytes in card memory.
+/// Radiance of a light group that a gather has brought, and the sum to which it is added; 15 bytes in card
+/// memory. The group is in the signs of the first two channels, which are not negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherResult {
     /// Sum to which the radiance is added.
     pub target: GatherTarget,
+    /// Light group, below 4.
+    pub light_group: u8,
     /// Radiance, in the card image's radiance units.
     pub brought: Vec3,
 }
 
+/// Position of the sign bit of an `f32`.
+const SIGN: u32 = u32::BITS - 1;
 /// Length of an encoded result, bytes.
 pub const RESULT_BYTES: usize = 15;
 
 impl GatherResult {
     /// Result without light.
-    pub const NONE: Self = Self { target: GatherRequest::NONE.target, brought: Vec3::ZERO };
+    pub const NONE: Self = Self { target: GatherRequest::NONE.target, light_group: 0, brought: Vec3::ZERO };
 
     /// Encodes the result.
     pub fn to_bytes(&self) -> [u8; RESULT_BYTES] {
-        let brought = self.brought.to_array().into_iter().flat_map(f32::to_le_bytes);
+        let signs = [self.light_group & 1, self.light_group >> 1 & 1, 0].map(|bit| u32::from(bit) << SIGN);
+        let channels = self.brought.to_array().into_iter().zip(signs);
+        let brought =
+            channels.flat_map(|(channel, sign)| (channel.to_bits() & !(1 << SIGN) | sign).to_le_bytes());
         let mut bytes = [0; RESULT_BYTES];
         let parts = self.target.to_bytes().into_iter().chain(brought);
         bytes.iter_mut().zip(parts).for_each(|(byte, part)| *byte = part);
@@ -112,8 +120,10 @@ impl GatherResult {
     pub fn from_bytes(bytes: &[u8; RESULT_BYTES]) -> Self {
         let (target, rest) = bytes.split_first_chunk().unwrap_or((&[0; 3], &[]));
         let channels: [[u8; 4]; 3] = rest.as_chunks().0.first_chunk().copied().unwrap_or_default();
-        let brought = Vec3::from_array(channels.map(f32::from_le_bytes));
-        Self { target: GatherTarget::from_bytes(*target), brought }
+        let [red, green, blue] = channels.map(u32::from_le_bytes);
+        let light_group = (red >> SIGN | green >> SIGN << 1) as u8;
+        let brought = [red, green, blue].map(|channel| f32::from_bits(channel & !(1 << SIGN)));
+        Self { target: GatherTarget::from_bytes(*target), light_group, brought: Vec3::from_array(brought) }
     }
 }
 
@@ -266,7 +276,8 @@ mod tests {
             position: u64,
             reflection: [u8; 13],
             target: [u8; 3],
-            brought: [f32; 3],
+            brought in [0.0..f32::MAX, 0.0..f32::MAX, 0.0..f32::MAX],
+            light_group in 0..4_u8,
         ) {
             let target = GatherTarget::from_bytes(target);
             let position = HilbertCode::of_bits(position);
@@ -282,7 +293,7 @@ mod tests {
             let lambertian = GatherRequest { reflection, ..request };
             let short = LambertianRequest::new(&lambertian).map(|short| short.request(part));
             prop_assert_eq!(short, Some(lambertian));
-            let result = GatherResult { target, brought: Vec3::from_array(brought) };
+            let result = GatherResult { target, light_group, brought: Vec3::from_array(brought) };
             prop_assert_eq!(GatherResult::from_bytes(&result.to_bytes()), result);
         }
     }

@@ -6,6 +6,7 @@ use super::lattice::Cell;
 use super::record::{Content, Record};
 use super::{IrradianceCache, LatticePoint};
 use crate::kind::{Capacity, Map};
+use crate::light_groups::GroupedLight;
 use crate::scene::Surface;
 use crate::vector::{max, min};
 
@@ -97,18 +98,29 @@ impl<R: Capacity> IrradianceCache<R> {
         self.weights(sample, allowed).is_some()
     }
 
-    /// Interpolated indirect irradiance over pi, `E / pi`, at a sample, W/(sr m^2); `None` if the sample
-    /// needs a final gather.
-    pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
+    /// Interpolated indirect irradiance over pi, `E / pi`, at a sample, W/(sr m^2), by light group; `None` if
+    /// the sample needs a final gather.
+    pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<GroupedLight> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;
-        let surface = sample.surface;
-        let mut sum = Vec3::ZERO;
-        for (LatticePoint { x, y }, weight) in cell.corners().into_iter().zip(weights) {
-            let record = self.records.get(&LatticePoint { x, y }).and_then(Option::as_ref);
-            if let Some(Record { content: Content::Gathered(irradiance), position, normal, .. }) = record {
-                sum += irradiance.at(*position, *normal, surface.position, surface.normal) * weight;
+        let of_all = 1.0 / weights.iter().sum::<f32>();
+        let corners = cell.corners();
+        Some(GroupedLight::of_groups(self.groups, |group| {
+            let of_corners = corners.iter().zip(weights);
+            let sum = of_corners.fold(Vec3::ZERO, |sum, (corner, weight)| {
+                sum + self.gathered(corner.of_group(group), sample.surface) * weight
+            });
+            sum * of_all
+        }))
+    }
+
+    /// Irradiance over pi that a record extrapolates to a surface; 0 if it is not gathered.
+    #[inline(always)]
+    fn gathered(&self, point: LatticePoint, surface: &Surface) -> Vec3 {
+        match self.records.get(&point) {
+            Some(Some(Record { content: Content::Gathered(irradiance), position, normal, .. })) => {
+                irradiance.at(*position, *normal, surface.position, surface.normal)
             }
+            _ => Vec3::ZERO,
         }
-        Some(sum * (1.0 / weights.iter().sum::<f32>()))
     }
 }

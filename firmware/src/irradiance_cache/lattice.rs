@@ -29,7 +29,16 @@ pub struct LatticePoint {
 /// miss the adjacent wall.
 const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
+/// Position of the light group in the row of a key. Rows are below 2^17: a picture has at most 2^16, and a
+/// lattice point lies at most a cell beyond.
+const GROUP_SHIFT: u32 = 30;
+
 impl LatticePoint {
+    /// Key of the records of a light group at this point.
+    pub(super) fn of_group(self, group: usize) -> Self {
+        Self { y: self.y | (group as u32) << GROUP_SHIFT, ..self }
+    }
+
     /// Position in the picture, pixels, through which the eye ray of this point's record goes.
     pub(super) fn film_position(&self) -> [f32; 2] {
         let [right, down] = FILM_OFFSET;

@@ -46,7 +46,6 @@ pub use lattice::{LatticePoint, Window};
 pub use saved::most_cache_words;
 pub use store::{Recalled, RecordStore};
 
-use glam::Vec3;
 use heapless::Vec;
 use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
@@ -54,6 +53,7 @@ use self::gradient::coefficients;
 use self::record::{Content, GatherSums, Record, Strongest};
 use self::survey_state::Survey;
 use crate::kind::{Capacity, Map};
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
 use crate::vector::max;
@@ -65,12 +65,18 @@ pub const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// Irradiance records of a block.
 pub struct IrradianceCache<R: Capacity> {
-    /// Records by lattice point; `None` where the eye does not see a surface with a Lambertian part directly.
+    /// Records by lattice point and light group; `None` where the eye does not see a surface with a
+    /// Lambertian part directly. The records of the first group come first, and all survey it. Those of the
+    /// other groups follow, group by group of one lattice point.
     records: R::Map<LatticePoint, Option<Record>>,
     /// Upper left corners of the coarsest cells, each with a bit mask of the divided cells in the cell's
     /// quadtree ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
+    /// Light groups, each of which has records of its own.
+    groups: LightGroups,
+    /// Number of lattice points; set when the survey ends.
+    points: usize,
 }
 
 /// Error: the cache's buffers are too small for the block.
@@ -86,7 +92,13 @@ impl<R: Capacity> Default for IrradianceCache<R> {
 impl<R: Capacity> IrradianceCache<R> {
     /// Creates a cache without records.
     pub const fn new() -> Self {
-        Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
+        Self {
+            records: Map::EMPTY,
+            roots: Vec::new(),
+            survey: Survey::BEGIN,
+            groups: LightGroups::ONE,
+            points: 0,
+        }
     }
 
     /// Sets the capacity to `records` records, a power of two, if the type leaves it open.
@@ -98,8 +110,9 @@ impl<R: Capacity> IrradianceCache<R> {
     ///
     /// # Errors
     /// [`Full`] if the window overlaps too many coarsest cells.
-    pub fn begin(&mut self, window: &Window) -> Result<(), Full> {
+    pub fn begin(&mut self, window: &Window, groups: LightGroups) -> Result<(), Full> {
         self.forget();
+        self.groups = groups;
         let steps = |from: u32, to: u32| {
             let first = from - from % lattice::COARSEST_SIDE;
             (first..to).step_by(lattice::COARSEST_SIDE as usize)
@@ -117,11 +130,35 @@ impl<R: Capacity> IrradianceCache<R> {
         self.records.clear();
         self.roots.clear();
         self.survey = Survey::BEGIN;
+        self.points = 0;
     }
 
-    /// Number of lattice points that the cache holds, with or without a record.
+    /// Ends the survey: adds the records of the other light groups, copies of those of the first.
+    fn add_groups(&mut self) -> Result<(), Fault> {
+        self.points = self.records.entries();
+        for index in 0..self.points {
+            let Some((&point, &record)) = self.records.entry(index) else { continue };
+            for group in 1..self.groups.count() {
+                if !self.records.insert(point.of_group(group), record) {
+                    return Err(Invariant::Record.fault());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Index of the record of a light group at the lattice point with index `index`.
+    #[inline(always)]
+    fn index_of(&self, index: usize, group: usize) -> usize {
+        match group.checked_sub(1) {
+            None => index,
+            Some(further) => self.points + index * (self.groups.count() - 1) + further,
+        }
+    }
+
+    /// Number of lattice points that the cache holds, with or without a record; 0 before the survey ends.
     pub fn lattice_points(&self) -> u32 {
-        self.records.entries() as u32
+        self.points as u32
     }
 
     /// Gather point of the record at lattice point number `index`, its direction table not chosen yet; `None`
@@ -139,31 +176,37 @@ impl<R: Capacity> IrradianceCache<R> {
     /// # Errors
     /// [`Invariant::Record`] if the record was not surveyed.
     pub fn begin_gather(&mut self, index: u32, point: &GatherPoint) -> Result<(), Fault> {
-        if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
-            && let Content::Surveyed(distances) = &record.content
-        {
-            let sums = GatherSums::new(&coefficients(point, distances));
+        let broken = Invariant::Record.fault();
+        let Some((_, Some(record))) = self.records.entry(index as usize) else { return Err(broken) };
+        let Content::Surveyed(distances) = &record.content else { return Err(broken) };
+        let sums = GatherSums::new(&coefficients(point, distances));
+        for group in 0..self.groups.count() {
+            let of_group = self.index_of(index as usize, group);
+            let Some((_, Some(record))) = self.records.entry_mut(of_group) else { return Err(broken) };
             record.content = Content::Gathering(Strongest::NONE, sums);
-            return Ok(());
         }
-        Err(Invariant::Record.fault())
+        Ok(())
     }
 
-    /// Adds the weighted radiance of a gather ray in cell `cell` of the hemisphere, in the card image's
-    /// radiance units, to record `index`.
+    /// Adds the weighted radiance, by light group, of a gather ray in cell `cell` of the hemisphere, in the
+    /// card image's radiance units, to record `index`.
     ///
     /// # Errors
     /// [`Invariant::Record`] if the record is not being gathered.
     #[inline]
-    pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) -> Result<(), Fault> {
-        if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
-            && let Content::Gathering(strongest, sums) = &mut record.content
-        {
-            strongest.add(cell, brought);
-            sums.add(cell, brought);
-            return Ok(());
+    pub fn add(&mut self, index: u16, cell: u8, brought: &GroupedLight) -> Result<(), Fault> {
+        for (group, brought) in brought.groups(self.groups).enumerate() {
+            let of_group = self.index_of(index.into(), group);
+            if let Some((_, Some(record))) = self.records.entry_mut(of_group)
+                && let Content::Gathering(strongest, sums) = &mut record.content
+            {
+                strongest.add(cell, brought);
+                sums.add(cell, brought);
+            } else {
+                return Err(Invariant::Record.fault());
+            }
         }
-        Err(Invariant::Record.fault())
+        Ok(())
     }
 
     /// Ends the gather of all records: converts their sums to irradiance over pi, W/(sr m^2). `allowed` is
@@ -179,7 +222,8 @@ impl<R: Capacity> IrradianceCache<R> {
             let Content::Gathering(strongest, sums) = record.content else {
                 return Err(Invariant::Record.fault());
             };
-            context.counters.records += 1;
+            // The records of all light groups at a lattice point count as one.
+            context.counters.records += u64::from(index < self.points);
             let irradiance = sums.limited(&strongest).irradiance(unit, record.distance);
             let reach = libm::sqrtf(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
@@ -190,6 +234,8 @@ impl<R: Capacity> IrradianceCache<R> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::kind::Entries;
     use crate::scene::Surface;
@@ -200,10 +246,11 @@ mod tests {
         let surface = Surface::white(Vec3::ZERO, Vec3::Y, 1.0);
         let mut cache = std::boxed::Box::new(IrradianceCache::<Entries<64>>::new());
         let point = GatherPoint::record(surface, Pattern::new(0, 0, 0, 0, Dimension::Irradiance), 1);
-        assert_eq!(cache.add(0, 0, Vec3::ONE), broken, "there is none");
+        let light = &LightGroups::ONE.light(0, Vec3::ONE);
+        assert_eq!(cache.add(0, 0, light), broken, "there is none");
         let record = Some(Record::new(&surface, 0.1));
         assert!(cache.records.insert(LatticePoint { x: 0, y: 0 }, record).is_ok());
-        assert_eq!(cache.add(0, 0, Vec3::ONE), broken, "it is being surveyed");
+        assert_eq!(cache.add(0, 0, light), broken, "it is being surveyed");
         assert_eq!(cache.begin_gather(0, &point), broken, "it is being surveyed");
         let mut record = Record::new(&surface, 0.1);
         assert_eq!(record.set_distance(0, 1.0), Ok(()));

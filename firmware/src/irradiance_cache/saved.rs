@@ -10,6 +10,7 @@ use super::{IrradianceCache, LatticePoint, MAX_ROOTS, Window};
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::kind::{Capacity, Map};
+use crate::light_groups::LightGroups;
 use crate::memory::{MemoryPort, WordReader, WordWriter};
 
 /// Words of a lattice point: its coordinates, and one of the codes below.
@@ -58,6 +59,7 @@ impl<R: Capacity> IrradianceCache<R> {
     pub fn restore<M: MemoryPort>(
         &mut self,
         window: &Window,
+        groups: LightGroups,
         words: &mut WordReader<M>,
     ) -> Result<(), Fault> {
         let broken = Invariant::Record.fault();
@@ -66,7 +68,7 @@ impl<R: Capacity> IrradianceCache<R> {
         if entries == 0 {
             return Ok(());
         }
-        self.begin(window).map_err(|_| broken)?;
+        self.begin(window, groups).map_err(|_| broken)?;
         for (_, divided) in &mut self.roots {
             *divided = words.word()?;
         }
@@ -77,6 +79,7 @@ impl<R: Capacity> IrradianceCache<R> {
                 return Err(broken);
             }
         }
+        self.points = self.records.entries() / groups.count();
         Ok(())
     }
 }
@@ -224,7 +227,7 @@ mod tests {
     /// Cache of [`WINDOW`] with these records at points of the lattice.
     fn cache(divided: [u32; 2], records: &[Option<Record>]) -> Cache {
         let mut cache = Cache::new();
-        cache.begin(&WINDOW).unwrap();
+        cache.begin(&WINDOW, LightGroups::ONE).unwrap();
         cache.roots.iter_mut().zip(divided).for_each(|(root, divided)| root.1 = divided);
         for (number, record) in (0..).zip(records) {
             let point = LatticePoint { x: 16 + 2 * number, y: 32 + number };
@@ -248,7 +251,7 @@ mod tests {
         // Earlier contents of the cache have no effect.
         let mut cache = cache([7; 2], &[None; 3]);
         let mut memory = Dram::new(lines);
-        cache.restore(window, &mut WordReader::new(&mut memory, Structure::Waiting, 1))?;
+        cache.restore(window, LightGroups::ONE, &mut WordReader::new(&mut memory, Structure::Waiting, 1))?;
         Ok(cache)
     }
 

@@ -22,6 +22,7 @@ use photoncard_shared::message::{self, Drain, Fault, FrameParameters, Invariant}
 use super::kept_line::{BlockHead, KeptRecord};
 use super::{IrradianceCache, MAX_ROOTS, Window};
 use crate::kind::{Capacity, Map};
+use crate::light_groups::LightGroups;
 use crate::memory::{MemoryPort, Stage, WORDS, line_of, words_of};
 use crate::render::Context;
 use crate::sampler::hash;
@@ -92,7 +93,9 @@ impl RecordStore {
         context.memory.enter(Stage::Survey);
         let Some((at, head)) = self.find(context.memory, window)? else { return Ok(Recalled::Nothing) };
         let Some(count) = head.records else { return Ok(Recalled::TooMany) };
-        if cache.begin(window).is_err() || count as usize > cache.records.capacity() {
+        if cache.begin(window, LightGroups::of(context.frame)).is_err()
+            || count as usize > cache.records.capacity()
+        {
             return Ok(Recalled::Nothing);
         }
         for address in (at..).skip(1).take(count as usize) {
@@ -105,7 +108,8 @@ impl RecordStore {
         for ((_, divided), kept) in cache.roots.iter_mut().zip(head.divided) {
             *divided = kept;
         }
-        context.counters.kept_records += u64::from(count);
+        // The records of all light groups at a lattice point count as one.
+        context.counters.kept_records += u64::from(count) / LightGroups::of(context.frame).count() as u64;
         Ok(Recalled::Records)
     }
 
@@ -259,6 +263,7 @@ mod tests {
             radiance: Radiance::Precomputed,
             caustics: Some(CausticGather { neighbors: u32::MAX, max_distance: 1.0 }),
             layers: true,
+            light_groups: 4,
             filter: Filter::BlackmanHarris,
             in_flight: u32::MAX,
             keep_records: true,
@@ -267,6 +272,7 @@ mod tests {
             position: true,
             coverage: true,
             identities: true,
+            irradiance: true,
         }
     }
 

@@ -50,7 +50,10 @@ impl<R: Capacity> IrradianceCache<R> {
                 self.survey.index = self.survey.first;
             }
             Task::Rays => self.cast(context)?,
-            Task::Division if self.survey.level + 1 >= LEVELS => return Ok(Ok(true)),
+            Task::Division if self.survey.level + 1 >= LEVELS => {
+                self.add_groups()?;
+                return Ok(Ok(true));
+            }
             Task::Division => match self.next_cell(window) {
                 Some(cell) => {
                     if !self.is_covered(context, &cell, allowed)? {
@@ -93,7 +96,9 @@ impl<R: Capacity> IrradianceCache<R> {
                 continue;
             }
             let record = new_record(context, corner, allowed)?;
-            if !self.records.insert(corner, record) {
+            // Each light group needs a record too.
+            let has_room = (self.records.entries() + 1) * self.groups.count() <= self.records.capacity();
+            if !has_room || !self.records.insert(corner, record) {
                 return Ok(Err(Full));
             }
         }

@@ -13,7 +13,7 @@ use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 pub struct Candidate {
     /// Squared distance from the query, m^2, as the bits of an `f32`.
     pub(super) distance: u32,
-    /// Power, direction and flags of the photon as a little-endian number, with the splitting axis cleared.
+    /// Power, direction and flags of the photon as a little-endian number.
     pub(super) content: u64,
 }
 
@@ -21,15 +21,13 @@ pub struct Candidate {
 /// photons.
 const SCRAMBLE: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Mask that clears the splitting axis in a photon's content.
-const WITHOUT_AXIS: u64 = !(3 << 48);
-
 impl Candidate {
-    /// Creates a candidate from a photon's content and its squared distance, m^2, which must not be negative.
+    /// Creates a candidate from a photon's content, without the splitting axis of a kd-tree, and its squared
+    /// distance, m^2, which must not be negative.
     #[inline(always)]
     pub fn new(distance_squared: f32, content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
         // Non-negative floats compare like their bits.
-        Self { distance: distance_squared.to_bits(), content: u64::from_le_bytes(content) & WITHOUT_AXIS }
+        Self { distance: distance_squared.to_bits(), content: u64::from_le_bytes(content) }
     }
 
     /// Sort key: bits of the squared distance, then the scrambled content.
@@ -81,6 +79,12 @@ impl Candidate {
     #[inline(always)]
     pub fn disc(&self) -> u8 {
         Photon::disc_of_flags(self.flags())
+    }
+
+    /// Light group of the photon's light.
+    #[inline(always)]
+    pub fn light_group(&self) -> u8 {
+        Photon::light_group_of_flags(self.flags())
     }
 
     /// Returns true if the photon came from a light without a bounce; in the caustic map, if it came from a

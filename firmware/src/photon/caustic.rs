@@ -10,6 +10,7 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
+use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use photoncard_shared::layout::{PhotonNode, decode_direction, kernel_share};
 use photoncard_shared::message::Fault;
 
@@ -17,6 +18,7 @@ use super::collector::{Collector, Lanes};
 use super::region::All;
 use super::{Candidate, MIN_NORMAL_COSINE, PhotonMap, SameSurface, leaves};
 use crate::fixed_point::ColourSum;
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::MemoryPort;
 use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -26,7 +28,7 @@ use crate::vector::max;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Caustics {
     /// Reflected radiance, photon power units/(sr m^2), times the weight in the `PartialReflection`.
-    pub radiance: Vec3,
+    pub radiance: GroupedLight,
     /// Number of photons of the point's surface whose discs contain the point.
     pub photons: u32,
     /// Number of photon normals decoded.
@@ -70,6 +72,8 @@ pub struct CausticSearch<'s, M> {
     /// `[n, g]`: unit shading normal and unit normal of the triangle. A photon from the direction `i` has the
     /// weight `n.i / g.i`, because the density of photons includes the factor `g.i` instead of `n.i`.
     pub normals: [Vec3; 2],
+    /// Light groups whose light is summed separately.
+    pub groups: LightGroups,
 }
 
 /// Maximum of the weight `n.i / g.i` (`CausticSearch::normals`).
@@ -90,7 +94,7 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
 
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
-        let Self { scene, memory, position, max_radius, reflection, lobe, lit_by, normals } = self;
+        let Self { scene, memory, position, max_radius, reflection, lobe, lit_by, normals, groups } = self;
         let margin = MARGIN_CELLS * scene.header.photon_grid.cell;
         let max_squared = max(max_radius * max_radius, f32::MIN_POSITIVE);
         let mut sums = Sums {
@@ -102,13 +106,18 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
             normals,
             surface: SameSurface::new(reflection.normal()),
             classes: SameSurface::classes(reflection.normal()),
-            power: ColourSum::ZERO,
-            of_lobe: ColourSum::ZERO,
+            groups,
+            power: [ColourSum::ZERO; MAX_LIGHT_GROUPS],
+            of_lobe: [ColourSum::ZERO; MAX_LIGHT_GROUPS],
             photons: 0,
         };
         leaves::gather(isa, scene, PhotonMap::Caustics.sections(), memory, (position, &All), &mut sums)?;
         let area = PI * max_squared;
-        let reflected = reflection.reflected(&sums.power, &sums.of_lobe);
+        let mut of_groups = sums.power.iter().zip(&sums.of_lobe);
+        let reflected = GroupedLight::of_groups(groups, |_| match of_groups.next() {
+            Some((power, of_lobe)) => reflection.reflected(power, of_lobe),
+            None => Vec3::ZERO,
+        });
         Ok(Caustics {
             radiance: reflected * (2.0 * FACTOR_UNIT / area),
             photons: sums.photons,
@@ -130,10 +139,11 @@ struct Sums<'a> {
     surface: SameSurface,
     /// Bit mask of the classes of normals that photons of the surface can have ([`SameSurface::classes`]).
     classes: u16,
-    /// Sum of power times kernel factor, divided by [`FACTOR_UNIT`].
-    power: ColourSum,
+    groups: LightGroups,
+    /// Sum of power times kernel factor, divided by [`FACTOR_UNIT`], by light group.
+    power: [ColourSum; MAX_LIGHT_GROUPS],
     /// Sum of power times kernel factor times [`PartialReflection::lobe_factor`], divided by [`FACTOR_UNIT`].
-    of_lobe: ColourSum,
+    of_lobe: [ColourSum; MAX_LIGHT_GROUPS],
     photons: u32,
 }
 
@@ -155,10 +165,14 @@ impl Sums<'_> {
         self.photons += 1;
         let factor = from_edge / (share * FACTOR_UNIT) * self.shading(photon);
         let power = Vec3::from_array(photon.power().decode()) * factor;
-        self.power.add_light(power);
+        let group = self.groups.index(photon.light_group());
+        let (Some(sum), Some(of_lobe)) = (self.power.get_mut(group), self.of_lobe.get_mut(group)) else {
+            return;
+        };
+        sum.add_light(power);
         let is_lit = self.lit_by == LitBy::All || !photon.is_direct();
         if is_lit && !self.reflection.is_lambertian() {
-            self.of_lobe.add_light(power * PartialReflection::lobe_factor(&self.lobe, photon.direction()));
+            of_lobe.add_light(power * PartialReflection::lobe_factor(&self.lobe, photon.direction()));
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn gather(
             _ => z,
         };
         if distance_squared <= nearest.limit() && filter.takes([x, y, z]) {
-            nearest.insert(isa, Candidate::new(distance_squared, Photon::content(record)));
+            nearest.insert(isa, Candidate::new(distance_squared, Photon::content_without_axis(record)));
         }
         let left = 2 * node + 1;
         let (near, far) = if offset < 0.0 { (left, left + 1) } else { (left + 1, left) };

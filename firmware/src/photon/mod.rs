@@ -27,6 +27,7 @@ pub use region::{SECTORS, Sectors, VisibleRegion};
 pub use same_surface::{MIN_NORMAL_COSINE, SameSurface};
 
 use self::region::{All, Filter};
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
 use crate::scene::{PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel};
@@ -97,6 +98,8 @@ pub struct GatherLimits {
     /// Gather radius, metres, above which a ray tests whether an object covers the point closely. In the
     /// narrow gap below such an object, the nearest photons do not represent the light at the point.
     pub free_within: f32,
+    /// Light groups whose light is summed separately.
+    pub groups: LightGroups,
 }
 
 /// Maximum radius of a visible region, divided by the distance of the k-th photon in the whole sphere.
@@ -113,14 +116,14 @@ pub fn gathered_radiance(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
     position: Vec3,
     reflection: &PartialReflection,
-    GatherLimits { neighbors, max_distance, free_within }: GatherLimits,
+    GatherLimits { neighbors, max_distance, free_within, groups }: GatherLimits,
     mut candidates: Candidates,
     count: &mut impl FnMut(u32, &NearestPhotons, &Reflected),
-) -> Result<Vec3, Fault> {
+) -> Result<GroupedLight, Fault> {
     let mut nearest = NearestPhotons::new(candidates.reborrow(), neighbors, max_distance);
     let tested = gather(scene, memory, PhotonMap::Indirect, position, &mut nearest)?;
     let cell = scene.header.photon_grid.cell;
-    let of_all = reflected_radiance(&nearest, cell, None, reflection);
+    let of_all = reflected_radiance(&nearest, cell, None, reflection, groups);
     count(tested, &nearest, &of_all);
     let radius = nearest.radius();
     let surface = (position, reflection.normal());
@@ -139,7 +142,7 @@ pub fn gathered_radiance(
         VISIBLE_MOST * radius * radius * (PI * radius * radius / region.sectors.area(radius * radius)),
     );
     let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
-    let of_region = reflected_radiance(&nearest, cell, Some(&region.sectors), reflection);
+    let of_region = reflected_radiance(&nearest, cell, Some(&region.sectors), reflection, groups);
     count(tested, &nearest, &of_region);
     // The closest photon is visible, and walls hide nothing around it: all photons represent the point.
     let is_vouched = of_all.sight == Sight::Unknown && of_all.closest == of_region.closest;

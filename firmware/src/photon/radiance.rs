@@ -20,10 +20,12 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
+use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use photoncard_shared::layout::{disc_fraction, is_of_region};
 
 use super::{Candidate, NearestPhotons, SameSurface, Sectors};
 use crate::fixed_point::ColourSum;
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::scene::{DecodedLobe, PartialReflection};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, min};
@@ -36,7 +38,7 @@ const MIN_RADIUS_SQUARED: f32 = 1.0 / PI;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflected {
     /// Reflected radiance, photon power units/(sr m^2), times the weight in the `PartialReflection`.
-    pub radiance: Vec3,
+    pub radiance: GroupedLight,
     /// Number of photon normals decoded.
     pub normals_decoded: u32,
     /// Closest photon of the point's surface; `None` if no photon is in the sum.
@@ -62,16 +64,18 @@ pub enum Sight {
 const APART: f32 = 7.0;
 
 /// Density estimate from the photons of a finished search: their reflected power, divided by the area of
-/// their disc or of `region`, if given. `cell` is the side of a cell of the photon grid, metres.
+/// their disc or of `region`, if given. `cell` is the side of a cell of the photon grid, metres. The light of
+/// `groups` is summed separately.
 #[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
     cell: f32,
     region: Option<&Sectors>,
     reflection: &PartialReflection,
+    groups: LightGroups,
 ) -> Reflected {
     let lobe = reflection.decode_lobe();
-    simd::run(Estimate { nearest, cell, region, reflection, lobe })
+    simd::run(Estimate { nearest, cell, region, reflection, lobe, groups })
 }
 
 /// Computation of [`reflected_radiance`], compiled for every instruction set.
@@ -86,6 +90,8 @@ pub struct Estimate<'a, 'n> {
     pub reflection: &'a PartialReflection,
     /// Lobe of the reflection.
     pub lobe: DecodedLobe,
+    /// Light groups whose light is summed separately.
+    pub groups: LightGroups,
 }
 
 impl Kernel for Estimate<'_, '_> {
@@ -93,16 +99,16 @@ impl Kernel for Estimate<'_, '_> {
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Reflected {
-        let Self { nearest, cell, region, reflection, lobe } = self;
+        let Self { nearest, cell, region, reflection, lobe, groups } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
         } else {
             (nearest.max_distance_squared(), None)
         };
-        let Some((closest, sums)) = sum(nearest, farthest, Sums::new(reflection, lobe)) else {
+        let Some((closest, sums)) = sum(nearest, farthest, Sums::new(reflection, lobe, groups)) else {
             let sight = if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
-            return Reflected { radiance: Vec3::ZERO, normals_decoded: 0, closest: None, sight };
+            return Reflected { radiance: GroupedLight::NONE, normals_decoded: 0, closest: None, sight };
         };
         let radius_squared = max(radius_squared, max(MIN_RADIUS_SQUARED * cell * cell, f32::MIN_POSITIVE));
         let fraction = disc_fraction(closest.disc());
@@ -119,7 +125,7 @@ impl Kernel for Estimate<'_, '_> {
             _ => Sight::Free,
         };
         Reflected {
-            radiance: sums.reflected() * (1.0 / area),
+            radiance: sums.reflected(1.0 / area),
             normals_decoded: sums.normals_decoded,
             closest: Some(closest),
             sight,
@@ -159,14 +165,16 @@ fn sum<'a>(
 ) -> Option<(Candidate, Sums<'a>)> {
     let (_, contents) = nearest.columns();
     let reflection = sums.reflection;
-    if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
+    let are_one = sums.groups.is_one() && reflection.is_lambertian();
+    if are_one && are_all_of(reflection.normal(), contents) {
         // With a single photon, `farthest` is the closest too.
         if farthest.is_some() && contents.len() < 2 {
             return None;
         }
-        sums.power.add_powers(contents);
+        let [power, ..] = &mut sums.power;
+        power.add_powers(contents);
         if let Some(farthest) = farthest {
-            sums.power.subtract_power(farthest.content);
+            power.subtract_power(farthest.content);
         }
         let closest = extreme(nearest, u32::min, |candidate, other| candidate.order() < other.order())?;
         return Some((closest, sums));
@@ -200,32 +208,41 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
 /// Position of the lowest bit of the normal's code in a photon's content.
 const NORMAL_SHIFT: u32 = 50;
 
-/// Sum of the photons' power (`power`), and of power times [`PartialReflection::lobe_factor`] (`lobe`).
+/// Sum of the photons' power (`power`), and of power times [`PartialReflection::lobe_factor`] (`lobe`), by
+/// light group.
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
-    power: ColourSum,
-    lobe: ColourSum,
+    power: [ColourSum; MAX_LIGHT_GROUPS],
+    lobe: [ColourSum; MAX_LIGHT_GROUPS],
+    groups: LightGroups,
     normals_decoded: u32,
 }
 
 impl<'a> Sums<'a> {
     #[inline(always)]
-    fn new(reflection: &'a PartialReflection, decoded: DecodedLobe) -> Self {
-        Self { reflection, decoded, power: ColourSum::ZERO, lobe: ColourSum::ZERO, normals_decoded: 0 }
+    fn new(reflection: &'a PartialReflection, decoded: DecodedLobe, groups: LightGroups) -> Self {
+        let none = [ColourSum::ZERO; MAX_LIGHT_GROUPS];
+        Self { reflection, decoded, power: none, lobe: none, groups, normals_decoded: 0 }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
-        self.power.add_rgbe(photon.power());
+        let group = self.groups.index(photon.light_group());
+        let (Some(power), Some(lobe)) = (self.power.get_mut(group), self.lobe.get_mut(group)) else { return };
+        power.add_rgbe(photon.power());
         if !self.reflection.is_lambertian() {
             let factor = PartialReflection::lobe_factor(&self.decoded, photon.direction());
-            self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
+            lobe.add(Vec3::from_array(photon.power().decode()) * factor);
         }
     }
 
     #[inline(always)]
-    fn reflected(&self) -> Vec3 {
-        self.reflection.reflected(&self.power, &self.lobe)
+    fn reflected(&self, scale: f32) -> GroupedLight {
+        let mut sums = self.power.iter().zip(&self.lobe);
+        GroupedLight::of_groups(self.groups, |_| match sums.next() {
+            Some((power, lobe)) => self.reflection.reflected(power, lobe) * scale,
+            None => Vec3::ZERO,
+        })
     }
 }

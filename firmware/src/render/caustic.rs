@@ -7,6 +7,7 @@ use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{CausticGather, Fault};
 
 use super::{Context, GatherPoint};
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{CausticSearch, LitBy, reflected_caustics};
 use crate::scene::{PartialReflection, Reflection, Reflector};
@@ -15,13 +16,18 @@ use crate::scene::{PartialReflection, Reflection, Reflector};
 ///
 /// # Errors
 /// If the card image is invalid.
-pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -> Result<Vec3, Fault> {
+pub fn reflected<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+) -> Result<GroupedLight, Fault> {
     let frame = context.frame;
-    let Some(CausticGather { max_distance, .. }) = frame.caustics else { return Ok(Vec3::ZERO) };
+    let Some(CausticGather { max_distance, .. }) = frame.caustics else {
+        return Ok(GroupedLight::NONE);
+    };
     let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
     let (reflection, lit_by) = lit(&point.surface.reflection, frame.gather_rays);
     if photons == 0 || reflection.is_black() {
-        return Ok(Vec3::ZERO);
+        return Ok(GroupedLight::NONE);
     }
     context.memory.enter(Stage::Caustic);
     context.counters.caustic_gathers += 1;
@@ -42,6 +48,7 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
         lobe,
         lit_by,
         normals: [surface.normal, surface.geometric_normal],
+        groups: LightGroups::of(frame),
     })?;
     let counters = &mut context.counters;
     counters.normals_decoded += u64::from(caustics.normals_decoded);

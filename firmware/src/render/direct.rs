@@ -29,6 +29,7 @@ use heapless::Vec;
 use photoncard_shared::message::{Fault, Invariant};
 
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
 use crate::sampler::Dimension;
 use crate::scene::light::{
@@ -38,8 +39,8 @@ use crate::scene::light::{
 use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
 use crate::vector::max_component;
 
-/// Direct light that a gather point reflects, W/(sr m^2), estimated by shadow rays and weighted against
-/// gather rays.
+/// Direct light that a gather point reflects, W/(sr m^2), by light group, estimated by shadow rays and
+/// weighted against gather rays.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -47,16 +48,16 @@ pub fn reflected<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
     point: &GatherPoint,
-) -> Result<Vec3, Fault> {
+) -> Result<GroupedLight, Fault> {
     if point.surface.reflection.is_black() || context.frame.shadow_rays == 0 {
-        return Ok(Vec3::ZERO);
+        return Ok(GroupedLight::NONE);
     }
     context.memory.enter(Stage::Shadow);
     let frame = context.frame;
     let (pattern, sample) = pixel.stratified(frame, Dimension::Emitter);
     let receiver = Receiver::new(&point.surface);
     let mut choices = LightChoices::new(receiver);
-    let mut sum = Vec3::ZERO;
+    let mut sum = GroupedLight::NONE;
     let mut rays = ShadowRays::new();
     for index in 0..frame.shadow_rays {
         let index = sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
@@ -68,11 +69,12 @@ pub fn reflected<M: MemoryPort>(
         {
             rays.push(receiver.origin, light)?;
             if rays.is_full() {
-                sum = rays.cast(context, point, sum)?;
+                rays.cast(context, point, &mut sum)?;
             }
         }
     }
-    Ok(rays.cast(context, point, sum)? / frame.shadow_rays as f32)
+    rays.cast(context, point, &mut sum)?;
+    Ok(sum / frame.shadow_rays as f32)
 }
 
 /// Shadow rays of a point that are cast together, each with its light sample.
@@ -98,23 +100,24 @@ impl ShadowRays {
         self.rays.is_full()
     }
 
-    /// Casts the rays. Returns `sum` plus the radiance that the point reflects, W/(sr m^2).
+    /// Casts the rays. Adds the radiance that the point reflects, W/(sr m^2), to `sum`.
     fn cast<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
         point: &GatherPoint,
-        mut sum: Vec3,
-    ) -> Result<Vec3, Fault> {
+        sum: &mut GroupedLight,
+    ) -> Result<(), Fault> {
+        let groups = LightGroups::of(context.frame);
         context.counters.shadow_rays += self.rays.len() as u64;
         let passed = transmittances(context.scene, context.memory, &self.rays)?;
         for (light, Passed(share)) in self.lights.iter().zip(passed) {
             if share != Vec3::ZERO {
-                sum += from_light(context, point, light) * share;
+                sum.add(groups.index(light.light_group), from_light(context, point, light) * share);
             }
         }
         self.rays.clear();
         self.lights.clear();
-        Ok(sum)
+        Ok(())
     }
 }
 
@@ -250,8 +253,13 @@ mod tests {
 
     #[test]
     fn one_shadow_ray_too_many_is_a_fault() {
-        let light =
-            || LightSample { direction: Vec3::Y, distance: 1.0, irradiance: Vec3::ONE, density: None };
+        let light = || LightSample {
+            direction: Vec3::Y,
+            distance: 1.0,
+            irradiance: Vec3::ONE,
+            density: None,
+            light_group: 0,
+        };
         let mut rays = ShadowRays::new();
         for _ in 0..BUNDLE_RAYS {
             assert_eq!(rays.push(Vec3::ZERO, light()), Ok(()));

@@ -1,4 +1,5 @@
-//! Eye rays, and the eye paths that follow them through perfectly specular surfaces.
+//! Eye rays, and the eye paths that follow them through perfectly specular surfaces. An irradiance frame has
+//! no such surfaces, and sensors have no rays.
 
 use glam::Vec3;
 use photoncard_shared::layout::TriangleId;
@@ -11,7 +12,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::sampler::Dimension;
 use crate::scene::camera::{self, CameraSample};
 use crate::scene::light::environment_radiance;
-use crate::scene::{Seen, Surface, closest_hit, read_surface};
+use crate::scene::{Detail, Seen, Surface, closest_hit, read_surface_with};
 use crate::vector::point_on_disc;
 
 /// Point of the picture and of the lens from which a path starts. The paths of a pixel are stratified over
@@ -92,8 +93,11 @@ impl Sight {
 /// If the card image is invalid.
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
-    context.counters.eye_rays += 1;
     let sample = camera_sample(context, pixel);
+    if !camera::has_rays(&context.frame.camera) {
+        return on_sensor(context, pixel, sample);
+    }
+    context.counters.eye_rays += 1;
     let ray = camera::ray(context.frame, &sample);
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Specular);
     // The first two random choices of a path are stratified over all paths of a pixel.
@@ -110,7 +114,8 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     };
     let of_surface = |choice| random(surface_choice(0, choice));
     let mut surface = Surface::NOWHERE;
-    read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut surface)?;
+    let detail = Detail::seen_in(context.frame);
+    read_surface_with(context.scene, context.memory, &ray, &hit, detail, &of_surface, &mut surface)?;
     let first_hit = FirstHit { id: hit.id, position: surface.position };
     let is_first = surface.specular.is_none();
     // Only the eye path can repeat a random choice between layers.
@@ -139,13 +144,29 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }))
 }
 
+/// Sight of a pixel's sensor.
+#[cold]
+#[inline(never)]
+fn on_sensor<M: MemoryPort>(
+    context: &mut Context<M>,
+    PixelSample { x, y, .. }: PixelSample,
+    sample: CameraSample,
+) -> Result<Sight, Fault> {
+    let nothing = Sight::Background { radiance: Vec3::ZERO, hit: None };
+    let sensor = camera::sensor(context.frame, context.scene, context.memory, [x, y])?;
+    Ok(sensor.map_or(nothing, |surface| {
+        let first = FirstHit { id: TriangleId::lone(0), position: surface.position };
+        Sight::Surface(View { surface, seen: None, is_first: true, sample, depth: 0.0, first })
+    }))
+}
+
 /// Sight of the environment at the end of a path that has left the scene.
 fn background<M: MemoryPort>(
     context: &mut Context<M>,
     path: &SpecularPath,
     hit: Option<(f32, FirstHit)>,
 ) -> Result<Sight, Fault> {
-    if hit.is_none() && context.frame.transparent {
+    if hit.is_none() && (context.frame.transparent || context.frame.irradiance) {
         return Ok(Sight::Background { radiance: Vec3::ZERO, hit });
     }
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
@@ -163,7 +184,8 @@ pub fn surface<M: MemoryPort>(
     seen: &Seen,
     surface: &mut Surface,
 ) -> Result<(), Fault> {
-    seen.surface(context.scene, context.memory, &camera::ray(context.frame, sample), surface)
+    let ray = camera::ray(context.frame, sample);
+    seen.surface(context.scene, context.memory, (&ray, Detail::seen_in(context.frame)), surface)
 }
 
 /// Finds the surface that the eye ray through position `film` of the picture, and the centre of the lens,
@@ -177,10 +199,11 @@ pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Op
     let ray = camera::ray(context.frame, &CameraSample::of_film(film));
     let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
     let mut found = Surface::NOWHERE;
+    let detail = Detail::seen_in(context.frame);
     // Read as a stored hit is, whose rounding differs.
     match Seen::new(&hit) {
-        Some(seen) => seen.surface(context.scene, context.memory, &ray, &mut found)?,
-        None => read_surface(context.scene, context.memory, &ray, &hit, &|_| 0.0, &mut found)?,
+        Some(seen) => seen.surface(context.scene, context.memory, (&ray, detail), &mut found)?,
+        None => read_surface_with(context.scene, context.memory, &ray, &hit, detail, &|_| 0.0, &mut found)?,
     }
     Ok(Some(found))
 }

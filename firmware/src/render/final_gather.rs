@@ -13,6 +13,7 @@ use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choic
 use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
 use crate::importance::GatherDirection;
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
 use crate::photon::{
     Candidates, GatherLimits, NearestPhotons, Reflected, gathered_radiance, nearest_irradiance,
@@ -27,8 +28,9 @@ use crate::scene::{
 pub struct GatherRayEnd {
     /// Cell of the gather point's hemisphere that contains the ray's direction.
     pub cell: u8,
-    /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units.
-    pub direct: Vec3,
+    /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units,
+    /// by light group.
+    pub direct: GroupedLight,
     /// Request for the photon gather at the end of the ray; `None` if no reflecting surface is there.
     pub request: Option<GatherRequest>,
 }
@@ -115,8 +117,9 @@ fn arrive<M: MemoryPort>(
     } else {
         beyond_specular(context, point, sampled, weight) * met.emission
     };
-    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit)
-        + collected(context, point, &path, sampled, weight);
+    let mut direct = collected(context, point, &path, sampled, weight);
+    let emitted = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    direct.add(LightGroups::of(context.frame).index(met.light_group), emitted);
     let weight = weight * path.throughput;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
@@ -142,10 +145,10 @@ fn escaped<M: MemoryPort>(
     sampled: &GatherDirection,
     weight: Vec3,
 ) -> Result<Option<GatherRayEnd>, Fault> {
-    let collected = collected(context, point, path, sampled, weight);
+    let mut direct = collected(context, point, path, sampled, weight);
     if context.scene.header.lights.texture.is_none() {
-        let end = GatherRayEnd { cell: sampled.cell, direct: collected, request: None };
-        return Ok((collected != Vec3::ZERO).then_some(end));
+        let end = GatherRayEnd { cell: sampled.cell, direct, request: None };
+        return Ok((!direct.is_none()).then_some(end));
     }
     let emitted = if path.is_straight {
         weight * direct::escaped(context, point, path.ray.direction, sampled.density)?
@@ -153,25 +156,43 @@ fn escaped<M: MemoryPort>(
         let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
         beyond_specular(context, point, sampled, weight) * radiance
     };
-    let direct = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit) + collected;
+    let lights = &context.scene.header.lights;
+    let emitted = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
+    direct.add(LightGroups::of(context.frame).index(lights.light_group), emitted);
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
 /// Light of point, spot and distant lights that narrow lobes on the path reflect, times the ray's weight, in
 /// the card image's radiance units. Zero if the gather point takes this light from the caustic map.
+#[inline(always)]
 fn collected<M>(
     context: &Context<M>,
     point: &GatherPoint,
     path: &SpecularPath,
     sampled: &GatherDirection,
     weight: Vec3,
-) -> Vec3 {
-    let is_by_map = context.frame.caustics.is_some() && point.surface.reflection.gathers_caustics();
-    if path.collected == Vec3::ZERO || is_by_map {
-        return Vec3::ZERO;
+) -> GroupedLight {
+    if path.bounces == 0 {
+        GroupedLight::NONE
+    } else {
+        collected_by_lobes(context, point, path, sampled, weight)
     }
-    beyond_specular(context, point, sampled, weight)
-        * path.collected
+}
+
+#[inline(never)]
+fn collected_by_lobes<M>(
+    context: &Context<M>,
+    point: &GatherPoint,
+    path: &SpecularPath,
+    sampled: &GatherDirection,
+    weight: Vec3,
+) -> GroupedLight {
+    let is_by_map = context.frame.caustics.is_some() && point.surface.reflection.gathers_caustics();
+    if path.collected.is_none() || is_by_map {
+        return GroupedLight::NONE;
+    }
+    path.collected
+        * beyond_specular(context, point, sampled, weight)
         * (1.0 / context.scene.header.radiance_unit)
 }
 
@@ -198,7 +219,7 @@ fn beyond_specular<M>(
 }
 
 /// Executes a gather. Returns the radiance that it contributes to its target, in the card image's radiance
-/// units.
+/// units, by light group. Irradiance points do not distinguish light groups: their light is in the first.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -206,20 +227,21 @@ pub fn gathered<M: MemoryPort>(
     context: &mut Context<M>,
     request: &GatherRequest,
     candidates: Candidates,
-) -> Result<Vec3, Fault> {
+) -> Result<GroupedLight, Fault> {
+    let groups = LightGroups::of(context.frame);
     context.memory.enter(Stage::Gather);
     let position = request.position.position(&context.scene.header.photon_grid).into();
     // A lobe needs the directions of photons, which precomputed irradiance lacks.
     if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
-        return Ok(
-            request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?
-        );
+        let irradiance = irradiance(context, position, request.reflection.normal())?;
+        return Ok(groups.light(0, request.reflection.lambertian() * irradiance));
     }
     let Context { scene, memory, frame, counters, .. } = context;
     let limits = GatherLimits {
         neighbors: frame.neighbors,
         max_distance: frame.max_distance,
         free_within: request.position.upper_length(&scene.header.photon_grid),
+        groups,
     };
     let reflection = &request.reflection;
     let mut count = |tested: u32, nearest: &NearestPhotons, reflected: &Reflected| {

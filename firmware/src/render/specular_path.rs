@@ -15,6 +15,7 @@ use photoncard_shared::budget::{FREE_BOUNCES, SPECULAR_BOUNCES};
 use photoncard_shared::message::Fault;
 
 use super::{Context, SHORTER};
+use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{
@@ -35,8 +36,8 @@ pub struct SpecularPath {
     /// Throughput between the path's origin and the current ray, dimensionless.
     pub throughput: Vec3,
     /// Light of point, spot and distant lights that narrow lobes on the path reflect towards the path's
-    /// origin, W/(sr m^2). No ray can hit these lights.
-    pub collected: Vec3,
+    /// origin, W/(sr m^2), by light group. No ray can hit these lights.
+    pub collected: GroupedLight,
     /// Number of specular surfaces that the path has passed.
     pub bounces: u32,
     /// Distance from the path's origin to the first specular surface, metres.
@@ -107,7 +108,7 @@ impl SpecularPath {
         Self {
             ray,
             throughput: Vec3::ONE,
-            collected: Vec3::ZERO,
+            collected: GroupedLight::NONE,
             bounces: 0,
             first_distance: 0.0,
             is_straight: true,
@@ -251,7 +252,9 @@ impl SpecularPath {
         loop {
             if self.passes_lobe(surface) {
                 let throughput = self.throughput;
-                self.collected += throughput * punctual_light(context, surface, self.bounces, random)?;
+                let (of_light, light) = punctual_light(context, surface, self.bounces, random)?;
+                let groups = LightGroups::of(context.frame);
+                self.collected.add(groups.index(of_light), throughput * light);
             }
             let here = |choice: Choice| random(choice.number(self.bounces));
             let [u, v] = if self.passes_lobe(surface) { Choice::DIRECTION.map(here) } else { [0.0; 2] };
@@ -304,33 +307,34 @@ pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Radiance, W/(sr m^2), that a surface's narrow lobe reflects from one light sample. It is zero if the light
-/// has an area, because rays of the lobe hit such lights.
+/// Light group of one light sample, and the radiance, W/(sr m^2), that a surface's narrow lobe reflects from
+/// it. The radiance is zero if the light has an area, because rays of the lobe hit such lights.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(
     context: &mut Context<M>,
     surface: &Surface,
     bounce: u32,
     random: &dyn Fn(u32) -> f32,
-) -> Result<Vec3, Fault> {
+) -> Result<(u8, Vec3), Fault> {
+    const NONE: (u8, Vec3) = (0, Vec3::ZERO);
     let [u, v] = Choice::LIGHT.map(|choice| random(choice.number(bounce)));
     let receiver = Receiver::new(surface);
     let mut choices = LightChoices::new(receiver);
     let Some(light) = sample_light(context.scene, context.memory, &mut choices, [u, v], u.to_bits())? else {
-        return Ok(Vec3::ZERO);
+        return Ok(NONE);
     };
-    let LightSample { direction, distance, irradiance, density } = light;
+    let LightSample { direction, distance, irradiance, density, light_group } = light;
     if density.is_some() || !surface.is_above(direction) || max_component(irradiance) <= 0.0 {
-        return Ok(Vec3::ZERO);
+        return Ok(NONE);
     }
     context.counters.shadow_rays += 1;
     let ray = Ray { origin: receiver.origin, direction, max_distance: distance * SHORTER };
     let share = transmittance(context.scene, context.memory, &ray)?;
     if share == Vec3::ZERO {
-        return Ok(Vec3::ZERO);
+        return Ok(NONE);
     }
     let lobe = Reflector { reflection: surface.reflection.narrow_lobe(), ..surface.reflector() };
-    Ok(lobe.evaluate(direction) * irradiance * surface.normal.dot(direction) * share)
+    Ok((light_group, lobe.evaluate(direction) * irradiance * surface.normal.dot(direction) * share))
 }
 
 #[cfg(test)]

@@ -1,10 +1,13 @@
-//! Cameras: the ray of a point of the picture, and the depth of a surface.
+//! Cameras: the ray or the sensor of a point of the picture, and the depth of a surface.
 
 use glam::Vec3;
-use photoncard_shared::message::{Camera, FrameParameters, Projection};
+use photoncard_shared::address::{LineAddress, Structure};
+use photoncard_shared::layout::{Record, Sensor};
+use photoncard_shared::message::{Camera, Fault, FaultCode, FrameParameters, Projection};
 
-use super::Ray;
-use crate::vector::unit;
+use super::{Ray, SceneImage, Surface, read_slot};
+use crate::memory::MemoryPort;
+use crate::vector::{max, max_component, min, unit};
 
 /// Point of the picture and of the lens from which a ray starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +52,46 @@ pub fn ray_at(camera: &Camera, [u, v]: [f32; 2], lens: [f32; 2]) -> Ray {
             let (height, radius) = libm::sincosf(latitude * y);
             Ray::new(origin, unit((forward * cos + right * sin) * radius + up * height))
         }
+        // Sensors have no rays.
+        Projection::Sensors { .. } => Ray::new(origin, forward),
     }
+}
+
+/// Returns false for sensors, which see without rays.
+pub fn has_rays(camera: &Camera) -> bool {
+    !matches!(camera.projection, Projection::Sensors { .. })
+}
+
+/// Maximum magnitude of a scene's coordinates, metres, that moves sensors off surfaces: by a millimetre
+/// ([`offset_origin`](super::offset_origin)). In wider scenes, sensors on a surface must lie off it.
+const MAX_REACH: f32 = 256.0;
+
+/// Reads the sensor of pixel `(x, y)` as a white Lambertian surface that is seen along its normal; `None` for
+/// a pixel without a sensor.
+///
+/// # Errors
+/// If the sensor is outside the card's memory.
+#[inline(never)]
+pub fn sensor(
+    frame: &FrameParameters,
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    [x, y]: [u32; 2],
+) -> Result<Option<Surface>, Fault> {
+    const PER_LINE: u32 = Sensor::PER_LINE as u32;
+    const BYTES: u32 = Sensor::BYTES as u32;
+    let Projection::Sensors { line, first, count } = frame.camera.projection else { return Ok(None) };
+    let number = y.wrapping_mul(frame.width).wrapping_add(x);
+    let Some(index) = number.checked_sub(first).filter(|&index| index < count) else { return Ok(None) };
+    let slot = index % PER_LINE;
+    let address = LineAddress(line.wrapping_add(index / PER_LINE));
+    let used = slot * BYTES..(slot + 1) * BYTES;
+    let bytes = read_slot::<{ Sensor::BYTES }>(memory, Structure::Attributes, address, slot as usize, used);
+    let bytes = bytes.ok_or(Fault { code: FaultCode::Record, detail: index })??;
+    let Sensor { position, normal } = Sensor::read(bytes);
+    let position = Vec3::from_array(position);
+    let magnitude = max(min(scene.header.reach, MAX_REACH), max_component(position.abs()));
+    Ok(Some(Surface::white(position, normal.into(), magnitude)))
 }
 
 /// Depth of a position, metres: its distance from the camera along the camera's axis, or in a panorama its
@@ -78,6 +120,7 @@ pub fn pixel_side(frame: &FrameParameters, position: Vec3) -> f32 {
         Projection::Pinhole | Projection::ThinLens { .. } => depth(camera, position) * up(),
         Projection::Orthographic => up(),
         Projection::Panorama { angles: [_, latitude] } => depth(camera, position) * latitude,
+        Projection::Sensors { .. } => 0.0,
     };
     half_height * 2.0 / frame.height as f32
 }

@@ -46,13 +46,13 @@ impl Seen {
         &self,
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
-        ray: &Ray,
+        (ray, detail): (&Ray, Detail),
         surface: &mut Surface,
     ) -> Result<(), Fault> {
         let id = TriangleId::lone(self.triangle);
         let triangle = read_triangle(scene, memory, id)?;
         let [v, w] = self.weights;
-        let place = (id, &triangle, Detail::Shading);
+        let place = (id, &triangle, detail);
         surface_of(scene, memory, ray, place, [1.0 - v - w, v, w], &|_| 0.0, surface)
     }
 }

@@ -6,7 +6,7 @@ use photoncard_shared::layout::{
     BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NARROW_LOBE, NO_TEXTURE, PANE, Reflectance,
     Triangle, TriangleId,
 };
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::corners::Corners;
 use super::coverage::covered;
@@ -31,6 +31,17 @@ pub enum Detail {
     /// each texture of a material without layers, and the geometric normal, with which photons are gathered,
     /// for the shading normal where no ray follows a narrow lobe. Less of the scene is read.
     Gathering,
+    /// A point at which irradiance is measured: a white Lambertian surface with the shading normal, without
+    /// emission.
+    Irradiance,
+}
+
+impl Detail {
+    /// Detail of the surfaces that eye rays meet.
+    #[inline(always)]
+    pub fn seen_in(frame: &FrameParameters) -> Self {
+        if frame.irradiance { Self::Irradiance } else { Self::Shading }
+    }
 }
 
 /// Surface at a point that a ray hits, seen from the ray's side: the side on which the ray's origin lies.
@@ -53,6 +64,8 @@ pub struct Surface {
     pub absorption: Vec3,
     /// Radiance emitted by the ray's side, W/(sr m^2).
     pub emission: Vec3,
+    /// Light group of the emission.
+    pub light_group: u8,
     /// Index of the emitter that the surface belongs to; `None` if it is not an emitter.
     pub emitter: Option<u32>,
     /// Probability of the random choices that were made: of a material layer, and of the Lambertian part or
@@ -88,6 +101,7 @@ impl Surface {
             specular: Specular::NONE,
             absorption: Vec3::ZERO,
             emission: Vec3::ZERO,
+            light_group: 0,
             emitter: None,
             probability: 1.0,
             coverage: 1.0,
@@ -217,6 +231,10 @@ pub(super) fn surface_of(
     *surface = Surface::white(position, normal, magnitude(&[a, b, c, ray.origin]));
     surface.outgoing = -ray.direction;
     surface.reflection = Reflection::BLACK;
+    surface.light_group = material.light_group;
+    if detail == Detail::Irradiance {
+        return finish_white(scene, memory, surface, (id, weights, is_front), &material);
+    }
     let is_visible = is_front || material.flags & DOUBLE_SIDED != 0;
     if let Reflectance::Phong { diffuse, specular, exponent } = material.reflectance
         && is_plain(&material)
@@ -293,6 +311,30 @@ fn finish(
     let Scattering { reflection, specular, absorption } = scattering(material, &texel, &view);
     (surface.reflection, surface.specular, surface.absorption) = (reflection, specular, absorption);
     shade_by_parts(surface, &view, random(0));
+    Ok(())
+}
+
+/// Makes a surface white and Lambertian, with the normal of its corners or its normal map.
+#[cold]
+#[inline(never)]
+fn finish_white(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    surface: &mut Surface,
+    (id, weights, is_front): (TriangleId, [f32; 3], bool),
+    material: &Material,
+) -> Result<(), Fault> {
+    surface.reflection = Reflection::lambertian(Vec3::ONE);
+    surface.light_group = 0;
+    let has_normals = material.flags & HAS_ATTRIBUTES != 0 && material.flags & PANE == 0;
+    let corners = if has_normals { Corners::read(scene, memory, id, weights)? } else { None };
+    let side = if is_front { 1.0 } else { -1.0 };
+    let front = surface.geometric_normal * side;
+    if let Some(corners) = &corners
+        && let Some(normal) = base_normal(scene, memory, material, (corners, None), front)?
+    {
+        surface.normal = normal * side;
+    }
     Ok(())
 }
 

@@ -203,6 +203,11 @@ fn tile(id: u32, width: u32, height: u32) -> Command<'static> {
 
 /// Frames that the card refuses: what is wrong, the frame, and the number of its parameter.
 fn refused_frames() -> Vec<(&'static str, FrameParameters, u32)> {
+    let sensors = |line, count, frame: FrameParameters| {
+        let projection = Projection::Sensors { line, first: 0, count };
+        FrameParameters { camera: Camera { projection, ..frame.camera }, ..frame }
+    };
+    let cached = FrameParameters { irradiance_error: Some(0.1), ..FRAME };
     let mut far = FRAME;
     far.camera.up[1] = f32::NAN;
     let caustics = |neighbors, max_distance| Some(CausticGather { neighbors, max_distance });
@@ -211,6 +216,9 @@ fn refused_frames() -> Vec<(&'static str, FrameParameters, u32)> {
         ("width 65537", FrameParameters { width: 65537, ..FRAME }, 0),
         ("height 0", FrameParameters { height: 0, ..FRAME }, 1),
         ("a camera that is no number", far, 2),
+        ("sensors behind the image", sensors(0, 1 << 20, FRAME), 2),
+        ("sensors behind all lines", sensors(u32::MAX, 6, FRAME), 2),
+        ("sensors that interpolate irradiance", sensors(0, 1, cached), 2),
         ("a first sample of the budget's samples", FrameParameters { first_sample: 4096, ..FRAME }, 4),
         ("no samples", FrameParameters { samples: 0, ..FRAME }, 5),
         ("a sample beyond the budget's", FrameParameters { first_sample: 4095, samples: 2, ..FRAME }, 5),

@@ -122,6 +122,7 @@ pub(crate) const FRAME: FrameParameters = FrameParameters {
     radiance: Radiance::Density,
     caustics: None,
     layers: false,
+    light_groups: 0,
     filter: Filter::Box,
     in_flight: u32::MAX,
     keep_records: false,
@@ -130,6 +131,14 @@ pub(crate) const FRAME: FrameParameters = FrameParameters {
     position: false,
     coverage: false,
     identities: false,
+    irradiance: false,
+};
+
+/// A frame of sensors.
+const SENSORS: FrameParameters = FrameParameters {
+    camera: Camera { projection: Projection::Sensors { line: 602, first: 512, count: 300 }, ..FRAME.camera },
+    irradiance: true,
+    ..FRAME
 };
 
 /// A frame with all options and no field of another's value.
@@ -161,6 +170,7 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     radiance: Radiance::Precomputed,
     caustics: Some(CausticGather { neighbors: 60, max_distance: 0.375 }),
     layers: true,
+    light_groups: 3,
     filter: Filter::BlackmanHarris,
     in_flight: 3,
     keep_records: true,
@@ -169,6 +179,7 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     position: true,
     coverage: true,
     identities: true,
+    irradiance: true,
 };
 
 fn projected(projection: &Projection) -> String {
@@ -182,6 +193,12 @@ fn projected(projection: &Projection) -> String {
         ]),
         Projection::Orthographic => object(&[("kind", "2".into())]),
         Projection::Panorama { angles } => object(&[("kind", "3".into()), ("angles", floats(angles))]),
+        Projection::Sensors { line, first, count } => object(&[
+            ("kind", "4".into()),
+            ("line", line.to_string()),
+            ("first", first.to_string()),
+            ("count", count.to_string()),
+        ]),
     }
 }
 
@@ -214,6 +231,7 @@ fn frame(frame: &FrameParameters) -> Vec<(&'static str, String)> {
         ("radiance", (frame.radiance as u8).to_string()),
         ("caustics", option(caustics)),
         ("layers", u8::from(frame.layers).to_string()),
+        ("light_groups", frame.light_groups.to_string()),
         ("filter", (frame.filter as u8).to_string()),
         ("in_flight", frame.in_flight.to_string()),
         ("keep_records", u8::from(frame.keep_records).to_string()),
@@ -222,6 +240,7 @@ fn frame(frame: &FrameParameters) -> Vec<(&'static str, String)> {
         ("position", u8::from(frame.position).to_string()),
         ("coverage", u8::from(frame.coverage).to_string()),
         ("identities", u8::from(frame.identities).to_string()),
+        ("irradiance", u8::from(frame.irradiance).to_string()),
     ]
 }
 
@@ -248,6 +267,7 @@ fn commands() -> Vec<String> {
         vector(("card", "WriteLines"), &[("first", "200".into()), ("data", hex(&line))], &write),
         vector(("card", "EndImage"), &[], &Command::EndImage),
         vector(("card", "BeginFrame"), &frame(&FRAME), &Command::BeginFrame(FRAME)),
+        vector(("card", "BeginFrame"), &frame(&SENSORS), &Command::BeginFrame(SENSORS)),
         vector(("card", "BeginFrame"), &frame(&FULL_FRAME), &Command::BeginFrame(FULL_FRAME)),
         vector(("card", "RenderTile"), &tile, &Command::RenderTile(Tile { id, x, y, width, height })),
         vector(("card", "Compute"), &[("data", hex(&case))], &Command::Compute { operands: &case }),
@@ -340,9 +360,11 @@ fn pixel(form: PixelForm) -> Vec<u8> {
     } else {
         view.with_light([1 << 40, 11, i64::MAX])
     };
+    let groups = (1..=i64::from(form.light_groups)).map(|group| [group << 40, group, 2]);
+    let sums = if form.light_groups > 0 { sums.with_light_groups(GroupSums::new(groups)) } else { sums };
     let mut bytes = Vec::new();
     sums.write(&mut |part| bytes.extend_from_slice(part));
-    assert_eq!(PixelSums::read(&bytes), Some(sums));
+    assert_eq!(PixelSums::read(form, &bytes), Some(sums));
     bytes
 }
 
@@ -422,7 +444,7 @@ pub(crate) fn no_commands() -> Vec<(&'static str, Vec<u8>)> {
         ("a protocol of more than 16 bits", vec![0, 0x80, 0x80, 0x04, 16]),
         ("EndImage and a byte", vec![4, 0]),
         ("BeginFrame without its last byte", frame[..frame.len() - 1].to_vec()),
-        ("projection 4", changed(projection, 4)),
+        ("projection 5", changed(projection, 5)),
         ("sampling 4", changed(sampling, 4)),
         ("an option of neither 0 nor 1", changed(sampling + 1, 2)),
         ("drain 4", changed(drain, 4)),

@@ -1,5 +1,7 @@
 //! Command-line arguments of all commands.
 
+mod autonomy;
+mod bake;
 mod cards;
 mod choice;
 mod farm;
@@ -9,7 +11,9 @@ mod integrator;
 mod lights;
 #[cfg(feature = "study")]
 mod machine;
+mod measure;
 mod merge;
+mod mix;
 mod outputs;
 mod photons;
 mod picture;
@@ -20,6 +24,7 @@ mod render;
 mod samples;
 mod scene;
 mod schedule;
+mod sensors;
 #[cfg(feature = "study")]
 mod study;
 #[cfg(feature = "study")]
@@ -45,12 +50,16 @@ use photoncard_driver::render::CardAddress;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
+pub(crate) use self::autonomy::AutonomyOptions;
+pub(crate) use self::bake::BakeOptions;
 use self::cards::{ChipOption, memory_size};
-pub(crate) use self::farm::{FarmCommand, FarmOptions};
+pub(crate) use self::farm::{Engine, FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::frames::{FrameOptions, last_numbered, numbered};
 pub(crate) use self::lights::LightOptions;
+pub(crate) use self::measure::{MeasureOptions, PointOptions, UnitOptions};
 pub(crate) use self::merge::MergeOptions;
+pub(crate) use self::mix::MixOptions;
 pub(crate) use self::outputs::OutputOptions;
 pub(crate) use self::prepare::PrepareOptions;
 pub(crate) use self::prepared::Step;
@@ -92,6 +101,8 @@ impl Command {
         match self {
             Self::Render(options) => options.progress,
             Self::Prepare(options) => options.progress,
+            Self::Measure(options) => options.progress,
+            Self::Bake(options) => options.progress,
             Self::Merge(options) => options.progress,
             _ => ProgressForm::Text,
         }
@@ -130,6 +141,14 @@ pub(crate) enum Command {
     Render(Box<RenderOptions>),
     /// Prepare a scene: write its card image, with photon map and settings, for photoncard render --prepared
     Prepare(Box<PrepareOptions>),
+    /// Measure irradiance and illuminance at points, direct and indirect, with standard errors
+    Measure(Box<MeasureOptions>),
+    /// Print the daylight autonomy: the share of points with enough light in enough hours, by a table an hour
+    Autonomy(AutonomyOptions),
+    /// Bake lightmaps: write a glb of the scene whose textures hold its light, for viewers without lights
+    #[command(mut_arg("spp", |spp| spp.default_value("4")))]
+    #[command(mut_arg("gather_rays", |rays| rays.default_value("48")))]
+    Bake(Box<BakeOptions>),
     /// Merge the parts of a picture, which renders with --part have written, to an EXR or a PNG
     Merge(MergeOptions),
     /// Print a render job for the engine of a render farm: preparation, parts, merge
@@ -141,6 +160,8 @@ pub(crate) enum Command {
         size.help(help).long_help(help)
     }))]
     View(Box<ViewOptions>),
+    /// Mix the light groups of a picture anew, without a render
+    Mix(MixOptions),
     /// Tone-map an EXR picture to a PNG, as a render does
     Tonemap(TonemapOptions),
     /// Print information on a scene

@@ -102,7 +102,7 @@ pub(crate) struct PictureOptions {
         value_name = "LIST",
         hide_short_help = true,
         help = format!(
-            "Layers of the EXR besides radiance, with commas between them: {}; or all, or none [default: {}]",
+            "Layers of the EXR besides radiance, with commas between them: {}, illuminance (lx, by a frame of its own); or all of one frame, or none [default: {}]",
             Layers::all().to_string().replace(',', ", "),
             Layers::default()
         )
@@ -115,6 +115,16 @@ pub(crate) struct PictureOptions {
     /// covering the background.
     #[arg(long, hide_short_help = true)]
     pub(crate) transparent: bool,
+    /// Show irradiance, W/m^2, of the surfaces that the camera sees, in place of radiance
+    ///
+    /// Surfaces count as white, Lambertian and dark; what glass and mirrors show is not looked for. A picture
+    /// beside its radiance has illuminance by --aov illuminance.
+    #[arg(long, hide_short_help = true)]
+    irradiance: bool,
+    /// Lumens per watt of --aov illuminance [default: 683 for a file of Blender, whose lights become watts; 1
+    /// for others, whose lights glTF states in candela and lux]
+    #[arg(long, value_name = "LUMENS", allow_negative_numbers = true, hide_short_help = true)]
+    pub(super) lumens_per_watt: Option<f32>,
     /// Pixel filter [default: blackman-harris; box with --quality paper]
     #[arg(long, value_parser = choice::<Filter>(), hide_short_help = true)]
     filter: Option<Filter>,
@@ -137,6 +147,8 @@ impl PictureOptions {
             focus,
             aov: _,
             transparent,
+            irradiance,
+            lumens_per_watt,
             filter,
         } = self;
         let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
@@ -154,8 +166,11 @@ impl PictureOptions {
             aperture: *aperture,
             focus: *focus,
             layers: self.layers(),
+            light_groups: Vec::new(),
             filter: filter.unwrap_or(base.filter),
             transparent: *transparent,
+            irradiance: *irradiance,
+            lumens_per_watt: *lumens_per_watt,
         }
     }
 
@@ -240,7 +255,7 @@ fn panorama(text: &str) -> Result<[f32; 2], String> {
     stated.ok_or_else(|| "a panorama is LONGITUDES,LATITUDES in degrees, such as 360,180".into())
 }
 
-fn place(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
     let place = place.filter(|place| place.iter().all(|number| number.is_finite()));

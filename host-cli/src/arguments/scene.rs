@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use photoncard_driver::scene::{LightUnits, MAX_SIDE, Material, Reflection, Scene};
+use photoncard_driver::scene::{LightUnits, MAX_SIDE, Material, Reflection, Scene, Sky};
 
 use super::lights::LightOptions;
 use crate::environment::EnvironmentOption;
@@ -16,10 +16,18 @@ pub(crate) struct SceneOptions {
     /// Change a material, a light or the environment: NAME.PROPERTY=VALUE; may be repeated
     ///
     /// Properties of a material are diffuse, specular, exponent, metallic, roughness, transmission, ior,
-    /// thickness, alpha and emission; those of a point, spot or directional light are colour, intensity and
-    /// position. environment.strength is a factor of the environment.
+    /// thickness, alpha and emission; those of a point, spot or directional light are colour, intensity,
+    /// position, angle and ies, a photometric file. environment.strength is a factor of the environment.
     #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
+    /// Separate the light of a group: GROUP=SOURCE,SOURCE with the names of lights, materials or objects, or
+    /// environment; may be repeated, for up to four groups
+    ///
+    /// An EXR then has a layer for each group, and photoncard mix changes their light without a render. Light
+    /// that no group names is in the group rest. With file, the groups are those that the file's extras
+    /// state.
+    #[arg(long, value_name = "GROUP=SOURCES", help_heading = "Scene", hide_short_help = true)]
+    pub(crate) light_groups: Vec<String>,
     /// Add the light that rough metals and coats reflect several times between their microfacets
     ///
     /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less
@@ -44,14 +52,38 @@ pub(crate) struct SceneOptions {
     /// Turn the environment map about +y, counter-clockwise seen from above [default: 0]
     ///
     /// A rotation of A degrees about Z in Blender's Mapping node is -A.
-    #[arg(long, value_name = "DEGREES", requires = "environment", allow_negative_numbers = true, value_parser = degrees, help_heading = "Scene", hide_short_help = true)]
+    #[arg(long, value_name = "DEGREES", requires = "environment", conflicts_with = "sky", allow_negative_numbers = true, value_parser = degrees, help_heading = "Scene", hide_short_help = true)]
     pub(crate) environment_rotation: Option<f32>,
+    /// Light of a clear sky and of the sun at a place and a time, such as 52.5,13.4,2026-06-21T14:30+02:00
+    ///
+    /// Latitude and longitude are degrees, north and east positive; the time is of ISO 8601 with its offset
+    /// from UTC. The turbidity is 1.7 to 10: 2 is very clear air, 3 clear [default: 3], 6 hazy. The light is
+    /// in cd/m^2 and lx, or in watts in files of Blender. The sun is a directional light called sun. Below
+    /// the horizon is a ground with an albedo of 0.2; by night the sky is black.
+    #[arg(
+        long,
+        value_name = "LAT,LON,TIME[,TURBIDITY]",
+        allow_hyphen_values = true,
+        conflicts_with = "environment",
+        help_heading = "Scene"
+    )]
+    pub(crate) sky: Option<Sky>,
+    /// Turn north from -z about +y, counter-clockwise seen from above [default: 0]
+    ///
+    /// East is +x then. In files of Blender, whose +y is -z of the exported file, north is +y.
+    #[arg(long, value_name = "DEGREES", requires = "sky", allow_negative_numbers = true, value_parser = degrees, help_heading = "Scene", hide_short_help = true)]
+    pub(crate) north: Option<f32>,
     /// Fail if anything in the scene is ignored or missing, such as a texture
     #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) strict: bool,
 }
 
 impl SceneOptions {
+    /// Returns whether an option states the light from infinitely far.
+    pub(crate) fn states_environment(&self) -> bool {
+        self.environment.is_some() || self.sky.is_some()
+    }
+
     /// Reports useless options: calls `add(is_useless, name, reason)` for each option that can be useless.
     pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
         let has_lobe =

@@ -70,8 +70,8 @@ pub(super) const OF_OTHERS: [Word; 17] = [
         commands: &[],
     },
     Word {
-        options: &["--env", "--envmap", "--hdri", "--world", "--sky", "--background"],
-        remedy: "light from infinitely far is stated by --environment FILE or R,G,B",
+        options: &["--env", "--envmap", "--hdri", "--world", "--background"],
+        remedy: "light from infinitely far is stated by --environment FILE or R,G,B, or by --sky LAT,LON,TIME",
         commands: PICTURE,
     },
     Word {

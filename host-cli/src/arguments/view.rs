@@ -72,8 +72,11 @@ impl ViewOptions {
     /// `--quality`; a pilot render may change these later.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
+        let mut picture = self.picture.settings(&base.picture);
+        // Pages show the layers of one frame.
+        picture.layers = picture.layers.of_one_frame();
         RenderSettings {
-            picture: self.picture.settings(&base.picture),
+            picture,
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
             schedule: self.schedule.settings(),

@@ -23,7 +23,11 @@ impl RenderOptions {
         let has_emulated = self.settings().cards.addresses.iter().any(is_emulated);
         add(self.cards.memory.is_stated() && !has_emulated, "--card-memory", "without an emulated card");
         outputs.without_effect(&mut add);
+        let has_lumens = picture.lumens_per_watt.is_some() && !picture.layers().have_illuminance();
+        add(has_lumens, "--lumens-per-watt", "without --aov illuminance");
         add(picture.aov.is_some() && !outputs.have_layers(), "--aov", "without -o OUT.exr");
+        let has_groups = !self.scene.light_groups.is_empty();
+        add(has_groups && !outputs.have_layers(), "--light-groups", "without -o OUT.exr");
         said
     }
 }

@@ -1,13 +1,13 @@
-//! Farm job: the steps that render a picture or frames.
+//! Farm job: the steps that render a picture or frames, or that do another command's work in parts.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
-use miette::{MietteDiagnostic, Report};
 use photoncard_shared::checksum::checksum;
 
-use super::words::Words;
+use super::parts::{PartSteps, Work};
+use super::words::{Words, not_for_a_job, refusal};
 use crate::arguments::{Arguments, FarmOptions, PictureFormat};
 use crate::failure::Failure;
 
@@ -26,10 +26,18 @@ pub(super) struct Job {
     pub(super) home: String,
     /// Folder of the prepared scenes and the parts.
     pub(super) folder: String,
-    pub(super) words: Words,
+    pub(super) steps: Steps,
     /// Number of parts that each picture is divided into.
     pub(super) parts: u32,
     pub(super) frames: Option<Frames>,
+}
+
+/// Commands of the steps.
+pub(super) enum Steps {
+    /// Preparation, render and merge of pictures.
+    Pictures(Words),
+    /// Parts of a command's work.
+    Parts(PartSteps),
 }
 
 impl Job {
@@ -56,13 +64,18 @@ impl Job {
         let command = Arguments::command();
         let engine = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm"));
         let words = engine.map_or(Ok(Words::default()), |engine| Words::new(given, engine));
-        let words = words.map_err(|name| {
-            refusal(
-                &format!("{name} is not for a farm's job"),
-                "leave it out: tasks state what they need themselves",
-            )
-        })?;
+        let words = words.map_err(|name| not_for_a_job(&name))?;
         let output = pictures.first().map_or(Path::new("out"), |picture| &picture.path);
+        Self::of(output, &print, Steps::Pictures(words), (options.parts, frames))
+    }
+
+    /// Creates a job whose first output is `output`; `print` is the text of all its arguments.
+    fn of(
+        output: &Path,
+        print: &str,
+        steps: Steps,
+        (parts, frames): (u32, Option<Frames>),
+    ) -> Result<Self, Failure> {
         let stem =
             output.file_stem().unwrap_or_default().to_string_lossy().replace(".#", "").replace('#', "");
         // The checksum of the arguments gives jobs with different options different folders.
@@ -71,7 +84,7 @@ impl Job {
         let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let path = |path: PathBuf| text(path.into_os_string());
         let (home, folder) = (path(home)?, path(folder)?);
-        Ok(Self { name, home, folder, words, parts: options.parts, frames })
+        Ok(Self { name, home, folder, steps, parts, frames })
     }
 
     /// Number of tasks between preparation and merge.
@@ -79,6 +92,21 @@ impl Job {
         let frames = self.frames.map_or(1, |Frames { first, last }| last - first + 1);
         u64::from(frames) * u64::from(self.parts)
     }
+}
+
+/// Job of the work of a command in parts. `given` are the arguments of the command.
+///
+/// # Errors
+/// If an argument is not UTF-8, or an option is not for a job.
+pub(super) fn of_arguments(
+    work: &Work,
+    parts: u32,
+    given: impl Iterator<Item = OsString>,
+) -> Result<Job, Failure> {
+    let given: Vec<String> = given.map(text).collect::<Result<_, _>>()?;
+    let print = format!("{}\n{}", work.command, given.join("\n"));
+    let steps = PartSteps::new(work, given, |path| text(path.as_os_str().to_owned()))?;
+    Job::of(work.output, &print, Steps::Parts(steps), (parts, None))
 }
 
 /// Range of `--frames`; `None` for a single picture.
@@ -103,8 +131,4 @@ fn text(word: OsString) -> Result<String, Failure> {
         let text = format!("'{}' is not UTF-8, and a job is text", word.to_string_lossy());
         refusal(&text, "rename it")
     })
-}
-
-fn refusal(text: &str, help: &str) -> Failure {
-    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }

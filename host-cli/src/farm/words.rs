@@ -1,8 +1,10 @@
 //! Sorts the words of a command line by the steps of a job to which they belong.
 
 use clap::{Arg, ArgAction, Command};
+use miette::{MietteDiagnostic, Report};
 
 use crate::arguments::Step;
+use crate::failure::Failure;
 
 /// Clap's ids of options that a job states itself, or that a job cannot have.
 const OF_NO_JOB: [&str; 12] = [
@@ -19,6 +21,18 @@ const OF_NO_JOB: [&str; 12] = [
     "trace",
     "progress",
 ];
+
+/// Error of an option that is not for a job.
+pub(super) fn not_for_a_job(option: &str) -> Failure {
+    refusal(
+        &format!("{option} is not for a farm's job"),
+        "leave it out: tasks state what they need themselves",
+    )
+}
+
+pub(super) fn refusal(text: &str, help: &str) -> Failure {
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
 
 /// Words of a command line, sorted by the steps of a farm's job that take them.
 #[derive(Debug, Default, PartialEq)]
@@ -41,27 +55,14 @@ impl Words {
     /// Returns the name of an option that is not allowed in a job.
     pub(super) fn new(given: impl IntoIterator<Item = String>, command: &Command) -> Result<Self, String> {
         let mut words = Self::default();
-        let mut given = given.into_iter();
-        while let Some(word) = given.next() {
-            let (name, has_value) = match word.split_once('=') {
-                Some((name, _)) if name.starts_with("--") => (name, true),
-                _ => (&*word, false),
-            };
-            let is_short = name.starts_with("-o");
-            let is_named =
-                |long: Option<&str>| long.is_some_and(|long| name.strip_prefix("--") == Some(long));
-            let argument = (command.get_arguments()).find(|argument| {
-                is_named(argument.get_long()) || is_short && argument.get_short() == Some('o')
-            });
-            let Some(argument) = argument else {
-                words.scene.extend((word != "--").then_some(word));
+        for (option, given) in options(given, command) {
+            let Some(option) = option else {
+                words.scene.extend(given);
                 continue;
             };
-            let takes_value = matches!(argument.get_action(), ArgAction::Set | ArgAction::Append);
-            let is_whole = has_value || is_short && name.len() > 2;
-            let value = if takes_value && !is_whole { given.next() } else { None };
-            for room in words.rooms(argument).ok_or_else(|| name.to_owned())? {
-                room.extend([&word].into_iter().chain(&value).cloned());
+            let name = given[0].split('=').next().unwrap_or_default();
+            for room in words.rooms(option).ok_or_else(|| name.to_owned())? {
+                room.extend(given.iter().cloned());
             }
         }
         Ok(words)
@@ -82,6 +83,34 @@ impl Words {
             Step::Job => Vec::new(),
         })
     }
+}
+
+/// Divides `given`, arguments of `command`, into options with their values, and other words.
+pub(super) fn options(
+    given: impl IntoIterator<Item = String>,
+    command: &Command,
+) -> Vec<(Option<&Arg>, Vec<String>)> {
+    let mut divided = Vec::new();
+    let mut given = given.into_iter();
+    while let Some(word) = given.next() {
+        let (name, has_value) = match word.split_once('=') {
+            Some((name, _)) if name.starts_with("--") => (name, true),
+            _ => (&*word, false),
+        };
+        let is_short = name.starts_with("-o");
+        let is_named = |long: Option<&str>| long.is_some_and(|long| name.strip_prefix("--") == Some(long));
+        let option = (command.get_arguments())
+            .find(|option| is_named(option.get_long()) || is_short && option.get_short() == Some('o'));
+        let takes_value =
+            option.is_some_and(|option| matches!(option.get_action(), ArgAction::Set | ArgAction::Append));
+        let is_whole = has_value || is_short && name.len() > 2;
+        if option.is_none() && word == "--" {
+            continue;
+        }
+        let value = if takes_value && !is_whole { given.next() } else { None };
+        divided.push((option, [word].into_iter().chain(value).collect()));
+    }
+    divided
 }
 
 #[cfg(test)]

@@ -124,6 +124,7 @@ pub(super) fn write(
         layers: layers.clone(),
         is_transparent: options.picture.transparent,
         identities: rendering.identities.clone(),
+        illuminance: rendering.illuminance.take(),
         sample_type: outputs.sample_type(),
         tone: outputs.tone.mapping(),
         denoised,
@@ -196,6 +197,8 @@ pub(crate) struct Form {
     pub(crate) is_transparent: bool,
     /// Names for the mattes of an EXR; `None` without mattes.
     pub(crate) identities: Option<Arc<Identities>>,
+    /// Illuminance for an EXR, lx; `None` without that layer.
+    pub(crate) illuminance: Option<Vec<f32>>,
     /// Type of an EXR's samples.
     pub(crate) sample_type: SampleFormat,
     /// Tone mapping of a PNG.
@@ -204,6 +207,21 @@ pub(crate) struct Form {
     pub(crate) denoised: Option<Vec<[f32; 3]>>,
     /// Header of a file with one part of a picture; `None` for a whole picture.
     pub(crate) part: Option<PartHead>,
+}
+
+impl Form {
+    /// Contents of an EXR of `film`.
+    pub(crate) fn content<'a>(&'a self, film: &'a Film) -> Content<'a> {
+        let Self { layers, is_transparent, identities, illuminance, denoised, .. } = self;
+        Content {
+            film,
+            layers,
+            denoised: denoised.as_deref(),
+            is_transparent: *is_transparent,
+            identities: identities.as_deref(),
+            illuminance: illuminance.as_deref(),
+        }
+    }
 }
 
 /// Writes a picture with its provenance. If it fails, an existing file stays unchanged.
@@ -215,18 +233,8 @@ pub(crate) fn write_picture(
 ) -> Result<(), Failure> {
     let PictureOutput { path, format } = picture;
     match format {
-        PictureFormat::Exr => {
-            let Form { layers, is_transparent, identities, denoised, .. } = form;
-            let content = Content {
-                film,
-                layers,
-                denoised: denoised.as_deref(),
-                is_transparent: *is_transparent,
-                identities: identities.as_deref(),
-            };
-            exr::write(path, &content, provenance, form.sample_type)
-                .map_err(|error| Failure::work_error(&error))
-        }
+        PictureFormat::Exr => exr::write(path, &form.content(film), provenance, form.sample_type)
+            .map_err(|error| Failure::work_error(&error)),
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
             let denoised = form.denoised.as_deref();

@@ -35,7 +35,7 @@ pub(super) fn is_finished(
         return false;
     }
     let mut stated = settings.identity(scene);
-    stated.insert("aov".to_owned(), Value::from(settings.picture.layers.to_string()));
+    stated.extend(settings.picture.of_layers());
     stated.extend(inputs.clone());
     match files::denoiser(files::denoises(options, outputs)) {
         Ok(denoiser) => stated.extend(denoiser.map(files::denoised_by)),

@@ -94,6 +94,7 @@ impl<'a> Preparation<'a> {
     /// Starts the preparation for pictures of `scene`.
     fn new(options: &'a PrepareOptions, scene: &Scene) -> Result<Self, Failure> {
         let mut settings = options.settings();
+        settings.picture.light_groups = scene.light_groups.names().to_vec();
         let camera = settings.camera(scene)?;
         options.picture.fit(&camera, &mut settings.picture);
         let uses = Uses::of(&options.scene, &settings.picture, Some(&options.frames));

@@ -117,6 +117,7 @@ impl OpenScene {
         };
         let mut settings = prepared.settings(options.settings_of(*quality));
         settings.outputs = options.tile_outputs(outputs);
+        settings.picture.light_groups = scene.light_groups.names().to_vec();
         let camera = settings.camera(scene)?;
         let misfit = options.picture.fit(&camera, &mut settings.picture);
         let mut inputs = inputs.clone();

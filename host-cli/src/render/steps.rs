@@ -101,25 +101,28 @@ pub(super) fn chosen(
 
 /// Memory of the card with the most memory, bytes. A scene may need all of it: smaller cards are then left
 /// out.
-pub(super) fn dram_bytes(settings: &RenderSettings) -> u64 {
+pub(crate) fn dram_bytes(settings: &RenderSettings) -> u64 {
     settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX)
 }
 
-/// Applies the assignments (`--set`) to a scene, and checks that the scene has light.
-pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene, Failure> {
+/// Applies the assignments (`--set`) and light groups to a scene, and checks that the scene has light.
+pub(crate) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene, Failure> {
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
     }
+    scene.set_light_groups(&options.light_groups).map_err(Failure::input)?;
     scene.check_light().map_err(Failure::input)?;
     Ok(scene)
 }
 
-/// Gives a picture without a stated size the camera's aspect ratio, and prints the loaded contents.
+/// Gives a picture the scene's light groups and, without a stated size, the camera's aspect ratio, and prints
+/// the loaded contents.
 pub(super) fn view(
     options: &RenderOptions,
     settings: &mut RenderSettings,
     scene: &Scene,
 ) -> Result<(), Failure> {
+    settings.picture.light_groups = scene.light_groups.names().to_vec();
     let camera = settings.camera(scene)?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);
     messages::say_loaded(options, settings, scene, &camera, misfit)

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     let (lower, upper) = scene.bounds();
     json!({
+        "checksum": scene.checksum(),
         "triangles": scene.placed_triangles(),
         "instances": scene.instances.len(),
         "emissive_triangles": scene.emissive_triangles(),
@@ -57,15 +58,21 @@ fn animation(animation: &Animation) -> Value {
 
 fn light(light: &PunctualLight, scene: &Scene) -> Value {
     let place = |position: Vec3| Some(scene.in_file(position).to_array());
-    let PunctualLight { name, kind, intensity } = light;
+    let PunctualLight { name, kind, intensity, axes } = light;
     let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
-    let (kind, position, direction, cone) = match kind {
-        PunctualKind::Point { position } => ("point", place(*position), None, None),
+    let disk = |angle: f32| (angle > 0.0).then(|| angle.to_degrees());
+    let (kind, position, direction, cone, angle) = match kind {
+        PunctualKind::Point { position } => ("point", place(*position), None, None, None),
         PunctualKind::Spot { position, direction, inner_cosine, outer_cosine } => {
             let cone = [degrees(*inner_cosine), degrees(*outer_cosine)];
-            ("spot", place(*position), Some(direction.to_array()), Some(cone))
+            ("spot", place(*position), Some(direction.to_array()), Some(cone), None)
         }
-        PunctualKind::Directional { direction } => ("directional", None, Some(direction.to_array()), None),
+        PunctualKind::Directional { direction, angle } => {
+            ("directional", None, Some(direction.to_array()), None, disk(*angle))
+        }
+        PunctualKind::Profile { position, .. } => {
+            ("profile", place(*position), Some(axes.aim.to_array()), None, None)
+        }
     };
     json!({
         "name": name,
@@ -73,6 +80,7 @@ fn light(light: &PunctualLight, scene: &Scene) -> Value {
         "at": position,
         "direction": direction,
         "cone_degrees": cone,
+        "angle_degrees": angle,
         "intensity": intensity.to_array(),
     })
 }

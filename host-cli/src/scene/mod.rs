@@ -127,7 +127,7 @@ fn animation(animation: &Animation) -> String {
 }
 
 fn light(light: &PunctualLight, scene: &Scene) -> String {
-    let PunctualLight { name, kind, intensity } = light;
+    let PunctualLight { name, kind, intensity, axes } = light;
     let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
     let kind = match kind {
         PunctualKind::Point { position } => {
@@ -139,8 +139,19 @@ fn light(light: &PunctualLight, scene: &Scene) -> String {
             let position = scene.in_file(*position);
             format!("spot at {position} towards {direction}, {cone}, {intensity} W/sr")
         }
-        PunctualKind::Directional { direction } => {
-            format!("directional towards {direction}, {intensity} W/m^2")
+        PunctualKind::Profile { position, texture } => {
+            let texture = scene.textures.get(*texture as usize);
+            let image = texture.and_then(|texture| scene.images.get(texture.image as usize));
+            let file = image.map_or("", |image| image.name.as_str());
+            let (position, aim) = (scene.in_file(*position), axes.aim);
+            format!("profile '{file}' at {position} towards {aim}, at most {intensity} W/sr")
+        }
+        PunctualKind::Directional { direction, angle } => {
+            let disk = match angle.to_degrees() {
+                0.0 => String::new(),
+                degrees => format!(", from a disk of {degrees:.2} degrees"),
+            };
+            format!("directional towards {direction}{disk}, {intensity} W/m^2")
         }
     };
     format!("{name}: {kind}")

@@ -31,6 +31,12 @@ pub(super) fn options(
     words: &[OsString],
     provenance: Provenance,
 ) -> Result<SweepOptions, Failure> {
+    if !arguments.scene.light_groups.is_empty() {
+        let report = MietteDiagnostic::new("a sweep has no --light-groups");
+        return Err(Failure::Input(Report::new(
+            report.with_help("leave it out: the groups of a picture share their gathers"),
+        )));
+    }
     let scene = input::load(&arguments.scene, u64::from(u32::MAX))?;
     let name = input::name(&arguments.scene);
     let picture = arguments.point(&name, arguments.model()).settings.picture;

@@ -11,12 +11,18 @@ use std::sync::Arc;
 use photoncard_driver::film::FilmPixel;
 use photoncard_driver::layer::Layer;
 use photoncard_driver::sink::FinishedTile;
+use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use photoncard_shared::counters::Counters;
 
+/// Factors of the light of each light group, by channel.
+pub(super) type Gains = [[f32; 3]; MAX_LIGHT_GROUPS];
+
 /// Quantity that a page shows: radiance or a layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Shown {
     Radiance,
+    /// Radiance whose light groups are mixed with these gains.
+    Mix(Gains),
     Layer(Layer),
 }
 
@@ -30,7 +36,7 @@ impl Shown {
     /// Name of the quantity in messages.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Self::Radiance => "radiance",
+            Self::Radiance | Self::Mix(_) => "radiance",
             Self::Layer(layer) => layer.name(),
         }
     }
@@ -38,7 +44,7 @@ impl Shown {
     /// Returns whether this is a layer that chips render only on request, such as `direct`.
     pub(super) fn is_of_chip(self) -> bool {
         match self {
-            Self::Radiance => false,
+            Self::Radiance | Self::Mix(_) => false,
             Self::Layer(layer) => layer.is_of_chip(),
         }
     }
@@ -172,12 +178,25 @@ impl Patch {
 
 /// Returns three values of a pixel for a page. The value of a layer with one channel is repeated.
 fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
-    let Shown::Layer(layer) = shown else { return pixel.pixel.radiance };
+    let layer = match shown {
+        Shown::Radiance => return pixel.pixel.radiance,
+        Shown::Mix(gains) => return mixed(pixel, &gains),
+        Shown::Layer(layer) => layer,
+    };
     match layer.channels() {
         [red, green, blue] => [red, green, blue].map(|channel| (channel.value)(pixel)),
         [channel, ..] => [(channel.value)(pixel); 3],
         [] => [0.0; 3],
     }
+}
+
+/// Radiance of a pixel with gains of its light groups, in the order in which `photoncard mix` adds them.
+fn mixed(pixel: &FilmPixel, gains: &Gains) -> [f32; 3] {
+    let [first, rest @ ..]: Gains = std::array::from_fn(|group| {
+        let [light, gain] = [pixel.light_groups[group], gains[group]];
+        [0, 1, 2].map(|channel: usize| light[channel] * gain[channel])
+    });
+    rest.into_iter().fold(first, |sum, group| [0, 1, 2].map(|channel: usize| sum[channel] + group[channel]))
 }
 
 /// Column and row of a tile's upper left corner, and the tile's number of pixels.

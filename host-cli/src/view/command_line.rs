@@ -66,15 +66,19 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
     let SceneOptions {
         path: _,
         assignments: _,
+        light_groups,
         energy_compensation,
         variant,
         texture_limit,
         lights,
         environment,
         environment_rotation,
+        sky,
+        north,
         strict,
     } = scene;
     wish.assignments().iter().for_each(|assignment| words.add("set", assignment));
+    light_groups.iter().for_each(|group| words.add("light-groups", group));
     words.add_switch("energy-compensation", *energy_compensation);
     words.add_some("variant", variant.as_ref());
     words.add_some("texture-limit", *texture_limit);
@@ -89,5 +93,7 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
         }),
     );
     words.add_some("environment-rotation", *environment_rotation);
+    words.add_some("sky", sky.as_ref());
+    words.add_some("north", *north);
     words.add_switch("strict", *strict);
 }

@@ -8,7 +8,7 @@ use photoncard_driver::scene::{
 };
 use serde_json::{Map, Value, json};
 
-use super::canvas::Shown;
+use super::canvas::{Gains, Shown};
 use super::wish::Wish;
 
 /// Name and bounding box of a scene, for the first message to a page.
@@ -76,6 +76,7 @@ fn light(light: &PunctualLight, scene: &Scene) -> Value {
     let (kind, position) = match light.kind {
         PunctualKind::Point { position } => ("point", place(position)),
         PunctualKind::Spot { position, .. } => ("spot", place(position)),
+        PunctualKind::Profile { position, .. } => ("profile", place(position)),
         PunctualKind::Directional { .. } => ("directional", None),
     };
     let unit = if position.is_some() { "W/sr" } else { "W/m^2" };
@@ -131,6 +132,12 @@ pub(super) fn changes(wish: &Wish) -> Value {
         _ => json!({"name": name, "value": value}),
     };
     wish.edits().iter().map(change).collect()
+}
+
+/// Gains of the light groups by name, as part of a message to pages.
+pub(super) fn gains(settings: &RenderSettings, gains: &Gains) -> Value {
+    let groups = settings.picture.light_groups.iter().zip(gains);
+    groups.map(|(name, gain)| (name.clone(), json!(gain))).collect::<Map<_, _>>().into()
 }
 
 /// Settings of the final picture, as part of a message to pages. Pages can change some of them.

@@ -6,11 +6,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use photoncard_driver::exr::SampleFormat;
+use photoncard_driver::exr::mix::{Gain, Mix, MixError};
+use photoncard_driver::exr::{self, SampleFormat};
+use photoncard_driver::film::Film;
 use photoncard_driver::render::{NamedSettings, Rendering};
-use photoncard_driver::tone_mapping::ToneMapping;
+use photoncard_driver::tone_mapping::{ToneMapping, write_png};
 use serde_json::json;
 
+use super::canvas::Gains;
 use super::pages::Outgoing;
 use super::request::Saving;
 use super::saving::Folder;
@@ -129,7 +132,10 @@ impl Hub {
 
     /// Saves the final picture of the newest request.
     fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
-        let version = self.lock().version();
+        let (version, gains) = {
+            let view = self.lock();
+            (view.version(), view.gains())
+        };
         let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let settled = settled.filter(|settled| settled.version == version);
         let settled = settled.ok_or("the picture is not settled yet: save it when it is")?;
@@ -138,7 +144,10 @@ impl Hub {
             return Err("the view is over".into());
         }
         let folder = folder.as_mut().ok_or("pictures are saved only by a view with --out DIR")?;
-        folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
+        folder.save(&saving.name, |path, format| {
+            let look = Look { tone: saving.tone, gains };
+            write(path, format, &settled, &look)
+        })
     }
 
     /// Waits until no picture is being written. Once the view is over, no further picture can be saved.
@@ -179,16 +188,59 @@ impl Hub {
     }
 }
 
-/// Writes a final picture as `photoncard render` would.
-fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
+/// Appearance of a picture on the page that saves it.
+struct Look {
+    tone: ToneMapping,
+    gains: Option<Gains>,
+}
+
+/// Writes a final picture as `photoncard render` would and, with gains, as `photoncard mix` does with its
+/// EXR.
+fn write(path: &Path, format: PictureFormat, settled: &Settled, look: &Look) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
+    let provenance = printable_json(&provenance);
     let layers = settled.wish.settings.picture.layers.clone();
     let denoised = settled.denoised.clone();
     let is_transparent = settled.wish.settings.picture.transparent;
     let identities = settled.rendering.identities.clone();
-    let sample_type = SampleFormat::Float;
-    let form = Form { layers, is_transparent, identities, sample_type, tone, denoised, part: None };
-    let picture = PictureOutput { path: path.to_owned(), format };
+    let (sample_type, tone) = (SampleFormat::Float, look.tone);
+    let form = Form {
+        layers,
+        is_transparent,
+        identities,
+        illuminance: None,
+        sample_type,
+        tone,
+        denoised,
+        part: None,
+    };
     let film = &settled.rendering.film;
-    write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())
+    let Some(gains) = look.gains else {
+        let picture = PictureOutput { path: path.to_owned(), format };
+        return write_picture(&picture, film, &provenance, &form).map_err(|failure| failure.line());
+    };
+    let mix = mixed(path, film, (&provenance, &form), &gains).map_err(|error| error.to_string())?;
+    match format {
+        PictureFormat::Exr => mix.write(path).map_err(|error| error.to_string()),
+        _ => {
+            let (alpha, provenance) = (mix.alpha(), mix.provenance());
+            let radiance = mix.radiance().into_iter();
+            write_png(path, mix.size(), radiance, alpha.as_deref(), tone, provenance.as_deref())
+                .map_err(|error| error.to_string())
+        }
+    }
+}
+
+/// Mix of a picture.
+fn mixed(
+    path: &Path,
+    film: &Film,
+    (provenance, form): (&str, &Form),
+    gains: &Gains,
+) -> Result<Mix, MixError> {
+    let mut mix = Mix::of_bytes(path, &exr::bytes(path, &form.content(film), provenance, form.sample_type)?)?;
+    let gains = film.light_groups().iter().cloned().zip(*gains);
+    let gains: Vec<Gain> = gains.map(|(group, factors)| Gain { group, factors }).collect();
+    mix.apply(&gains)?;
+    Ok(mix)
 }

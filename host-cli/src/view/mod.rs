@@ -143,7 +143,9 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
 /// Loads the scene, and gives the picture the camera's aspect ratio. Assignments (`--set`) are not applied.
 fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX);
-    let scene = input::load(&options.scene, dram_bytes)?;
+    let mut scene = input::load(&options.scene, dram_bytes)?;
+    scene.set_light_groups(&options.scene.light_groups).map_err(Failure::input)?;
+    settings.picture.light_groups = scene.light_groups.names().to_vec();
     let camera = settings.camera(&scene)?;
     notices::say_ignored(&options.scene, &scene, &Uses::of(&options.scene, &settings.picture, None))?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);

@@ -74,6 +74,13 @@ impl Page {
         (self.shown, self.next) = (shown, 0);
     }
 
+    /// Sends all tiles to the page again, if it shows radiance.
+    pub(super) fn mix_again(&mut self) {
+        if self.shown == Shown::Radiance {
+            self.next = 0;
+        }
+    }
+
     /// Returns whether the page shows a layer that chips render only on request, such as `direct`.
     pub(super) fn shows_layer_of_chip(&self) -> bool {
         self.shown.is_of_chip()

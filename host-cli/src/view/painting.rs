@@ -148,10 +148,13 @@ impl View {
 /// alone: for few rays this is faster than gathering photons for direction tables.
 fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     settings.clone().with(|settings| {
+        // A chip may lack room for irradiance records of each light group.
+        let has_groups = !settings.picture.light_groups.is_empty();
         let picture = &mut settings.picture;
         let Integrator { gather_rays, shadow_rays, irradiance_error, .. } = settings.integrator;
         [picture.width, picture.height] = [picture.width, picture.height].map(|side| side.div_ceil(step));
-        let is_small = u64::from(picture.width) * u64::from(picture.height) <= FEW_PIXELS;
+        let is_small = has_groups && settings.integrator.irradiance_error.is_none()
+            || u64::from(picture.width) * u64::from(picture.height) <= FEW_PIXELS;
         picture.filter = Filter::Box;
         let [of_pixel, of_record] = RAYS.map(|rays| rays.min(gather_rays));
         let error = irradiance_error.unwrap_or(IRRADIANCE_ERROR).max(IRRADIANCE_ERROR);

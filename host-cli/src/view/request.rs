@@ -30,6 +30,11 @@ pub(super) enum Request {
         name: String,
         value: Vec<f64>,
     },
+    /// Factors of the light of a light group.
+    Mix {
+        group: String,
+        gain: [f32; 3],
+    },
     Setting(Setting),
     Reset,
     Layer(Shown),
@@ -109,6 +114,7 @@ fn request(fields: &Fields) -> Result<Request, Fault> {
     Ok(match fields.text("type")?.as_str() {
         "camera" => Request::Camera { view: view(fields)?, is_moving: fields.switch("moving")? },
         "set" => Request::Set { name: fields.text("name")?, value: fields.values("value")? },
+        "mix" => Request::Mix { group: fields.text("name")?, gain: gain(fields)? },
         "setting" => Request::Setting(setting(fields)?),
         "reset" => Request::Reset,
         "layer" => Request::Layer(layer(&fields.text("name")?)?),
@@ -138,6 +144,21 @@ fn view(fields: &Fields) -> Result<View, String> {
         look_at: fields.place("look_at")?,
         shown,
     })
+}
+
+/// Factors in the field `value`: one number, or one for each channel.
+fn gain(fields: &Fields) -> Result<[f32; 3], String> {
+    let factors = fields.values("value")?;
+    let factors = match factors[..] {
+        [red, green, blue] => [red, green, blue],
+        _ => [factors.first().copied().unwrap_or(1.0); 3],
+    };
+    let is_gain = factors.iter().all(|factor| *factor >= 0.0);
+    if is_gain {
+        Ok(factors.map(|factor| factor as f32))
+    } else {
+        Err("\"value\" is a factor of 0 or more, or three".into())
+    }
 }
 
 fn layer(name: &str) -> Result<Shown, String> {
@@ -278,6 +299,14 @@ mod tests {
                 r#"{"type":"set","name":"a.b","value":2}"#,
                 Request::Set { name: "a.b".into(), value: vec![2.0] },
             ),
+            (
+                r#"{"type":"mix","name":"key","value":[1.5,0,2]}"#,
+                Request::Mix { group: "key".into(), gain: [1.5, 0.0, 2.0] },
+            ),
+            (
+                r#"{"type":"mix","name":"key","value":0.5}"#,
+                Request::Mix { group: "key".into(), gain: [0.5; 3] },
+            ),
             (r#"{"type":"setting","name":"cache","value":false}"#, Request::Setting(Setting::Cache(false))),
             (
                 r#"{"type":"setting","name":"order","value":"hash"}"#,
@@ -335,6 +364,7 @@ mod tests {
             (r#"{"type":"set","name":"a.b","value":1e39}"#.into(), "value"),
             (r#"{"type":"set","name":"a.b","value":[1,2]}"#.into(), "value"),
             (format!(r#"{{"type":"set","name":"{}","value":1}}"#, "a".repeat(2000)), "name"),
+            (r#"{"type":"mix","name":"key","value":[1,-1,1]}"#.into(), "value"),
             (r#"{"type":"setting","name":"spp","value":-1}"#.into(), "value"),
             (r#"{"type":"setting","name":"spp","value":1.5}"#.into(), "value"),
             (r#"{"type":"setting","name":"order","value":"best"}"#.into(), "best"),

@@ -7,9 +7,10 @@ use std::time::Duration;
 use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
+use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use serde_json::{Value, json};
 
-use super::canvas::{Canvas, Origin, Shown};
+use super::canvas::{Canvas, Gains, Origin, Shown};
 use super::cards::CardBoard;
 use super::command_line;
 use super::describe::{self, Cost, SceneFacts};
@@ -74,6 +75,8 @@ pub(super) struct View {
     /// Last complete pass of the newest request.
     pub(super) done: Option<Origin>,
     pub(super) cost: Cost,
+    /// Gains of the light groups in the radiance that pages show; 1 for the picture as it is rendered.
+    gains: Gains,
     /// Number of the first request that has the present size of the picture.
     of_size: u32,
     /// Pixel near which tiles are rendered first.
@@ -108,6 +111,7 @@ impl View {
             canvas: Canvas::default(),
             done: None,
             cost: Cost::default(),
+            gains: [[1.0; 3]; MAX_LIGHT_GROUPS],
             of_size: 0,
             cursor: None,
             pages: BTreeMap::new(),
@@ -127,6 +131,7 @@ impl View {
         let mut page = Page::new();
         let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
         hello["size_stated"] = json!(self.start.is_size_stated);
+        hello["light_groups"] = json!(self.wish.settings.picture.light_groups);
         page.reply(hello.to_string());
         self.pages.insert(number, page);
         number
@@ -232,6 +237,7 @@ impl View {
                 (wish.settings.picture.width, wish.settings.picture.height) = (width, height);
             }
             Request::Reset => {
+                self.set_gains([[1.0; 3]; MAX_LIGHT_GROUPS]);
                 let picture = &self.wish.settings.picture;
                 wish = self.start.wish.clone();
                 (wish.settings.picture.width, wish.settings.picture.height) = (picture.width, picture.height);
@@ -239,6 +245,7 @@ impl View {
                     wish.add_layers();
                 }
             }
+            Request::Mix { group, gain } => return self.mix(&group, gain),
             Request::Cursor(at) => {
                 self.cursor = at;
                 return Ok(());
@@ -250,6 +257,30 @@ impl View {
             self.refinement.moves(is_moving, now);
         }
         Ok(())
+    }
+
+    /// Sets the gain of a light group. No pixel is rendered again.
+    fn mix(&mut self, group: &str, gain: [f32; 3]) -> Result<(), String> {
+        let names = &self.wish.settings.picture.light_groups;
+        let found = names.iter().position(|name| name == group);
+        let index = found.ok_or_else(|| format!("there is no light group {group:?}"))?;
+        let mut gains = self.gains;
+        gains[index] = gain;
+        self.set_gains(gains);
+        Ok(())
+    }
+
+    fn set_gains(&mut self, gains: Gains) {
+        if gains != self.gains {
+            self.gains = gains;
+            self.pages.values_mut().for_each(Page::mix_again);
+        }
+        self.revisions.state += 1;
+    }
+
+    /// Gains of the light groups; `None` for the picture as it is rendered.
+    pub(super) fn gains(&self) -> Option<Gains> {
+        Some(self.gains).filter(|gains| gains.as_flattened().iter().any(|gain| *gain != 1.0))
     }
 
     /// Makes `wish` the newest request, if it differs from the present one.
@@ -340,7 +371,10 @@ impl View {
             Outgoing::Reply(text) => Ok(text),
             Outgoing::State(has_all) => Ok(self.describe(has_all).to_string()),
             Outgoing::Cards => Ok(self.cards.describe().to_string()),
-            tile @ Outgoing::Tile(..) => Err(tile),
+            Outgoing::Tile(patch, shown) => {
+                let gains = self.gains().filter(|_| shown == Shown::Radiance);
+                Err(Outgoing::Tile(patch, gains.map_or(shown, Shown::Mix)))
+            }
         })
     }
 
@@ -385,6 +419,7 @@ impl View {
             "command": command_line::quoted(&self.command()),
             "changes": describe::changes(&self.wish),
             "settings": describe::settings(settings),
+            "gains": describe::gains(settings, &self.gains),
             "cost": self.cost.describe(),
         })
     }

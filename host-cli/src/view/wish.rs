@@ -37,8 +37,12 @@ impl Wish {
 
     /// Assignments of the command line, then those of pages: the order in which they are applied.
     pub(super) fn assignments(&self) -> Vec<String> {
-        let edits = self.edits.iter().map(|(name, value)| format!("{name}={}", numbers(value)));
-        self.given.iter().cloned().chain(edits).collect()
+        self.given.iter().cloned().chain(self.edited()).collect()
+    }
+
+    /// Assignments by pages, as text.
+    fn edited(&self) -> impl Iterator<Item = String> {
+        self.edits.iter().map(|(name, value)| format!("{name}={}", numbers(value)))
     }
 
     /// Assignments by pages.
@@ -199,7 +203,9 @@ impl Sketch {
         if let (Some(environment), Some(sketched)) = (&mut scene.environment, &self.0.environment) {
             environment.strength = sketched.strength;
         }
-        wish.assignments().iter().try_for_each(|assignment| scene.apply(assignment))?;
+        wish.given.iter().try_for_each(|assignment| scene.apply(assignment))?;
+        // Assignments of pages read no files.
+        wish.edited().try_for_each(|assignment| scene.assign(&assignment))?;
         Ok(scene.check_light()?)
     }
 }

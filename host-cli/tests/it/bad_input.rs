@@ -243,6 +243,23 @@ fn files_that_are_no_environment_are_refused() {
 }
 
 #[test]
+fn skies_of_no_place_or_time_are_refused() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for (sky, said) in [
+        ("91,0,2026-06-21T12:00Z", "-90 to 90"),
+        ("0,0,2026-13-21T12:00Z", "month 13"),
+        ("0,0,2026-06-21T12:00", "offset"),
+        ("0,0,2026-06-21T12:00Z,0", "1.7 to 10"),
+    ] {
+        refused(&room, "scene.gltf", &["--sky", sky], &["--sky", said]);
+    }
+    let both = ["--sky", "0,0,2026-06-21T12:00Z", "--environment", "1,1,1"];
+    refused(&room, "scene.gltf", &both, &["--sky", "--environment"]);
+    refused(&room, "scene.gltf", &["--north", "90"], &["--sky"]);
+}
+
+#[test]
 fn options_for_emulated_cards_are_refused_for_others() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());

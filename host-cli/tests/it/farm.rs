@@ -250,6 +250,66 @@ fn the_job_type_of_flamenco_renders_the_picture() {
     check_pictures(&room);
 }
 
+/// Points are measured in parts, of which one is repeated, and all when the points change.
+#[test]
+fn a_job_of_a_measurement_makes_its_table() {
+    let room = Room::new();
+    let folder = room.path(FOLDER);
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(shipped("cornell.gltf"), folder.join(SCENE)).unwrap();
+    let points = "p {} 'x'.txt";
+    let write = |height: f64| {
+        let line = |index: u32| format!("0.1 {} {} 0 1 0\n", height, f64::from(index) * 0.05 - 0.2);
+        std::fs::write(folder.join(points), (0..7).map(line).collect::<String>()).unwrap();
+    };
+    let own = ["measure", SCENE, "--points", points, "--photons", "900", "--spp", "2", "--quiet"];
+    let whole = || {
+        let outcome = run(&room, &[&own[..], &["-o", "whole.csv"]].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        std::fs::read(folder.join("whole.csv")).unwrap()
+    };
+    write(-0.5);
+    let of_farm = ["-o", "{{out}}.csv", "--farm", "parallel", "--parts", "3"];
+    let job = run(&room, &[&own[..], &of_farm].concat());
+    assert_eq!((job.status, &*job.stderr), (Some(0), ""));
+    let table = || std::fs::read(folder.join("{{out}}.csv")).unwrap();
+    by_hand(&room, &job.stdout);
+    assert_eq!(table(), whole());
+    write(0.2);
+    by_hand(&room, &job.stdout);
+    assert_eq!(table(), whole());
+    for (options, words) in [
+        (&["-o", "-", "--farm", "slurm"][..], "writes its table to a file"),
+        (&["-o", "a.csv", "--farm", "slurm", "--progress", "openjd"], "--progress is not for a farm's job"),
+        (&["-o", "a.csv", "--farm", "slurm", "--part", "1/2"], "cannot be used with"),
+        (&["-o", "a.csv", "--parts", "3"], "--farm"),
+    ] {
+        let outcome = run(&room, &[&own[..], options].concat());
+        assert_eq!(outcome.status, Some(2), "{options:?}");
+        assert!(outcome.stderr.contains(words), "{}", outcome.stderr);
+    }
+}
+
+/// Lightmaps are baked in parts; files of the pages are written by the last step.
+#[test]
+fn a_job_of_a_bake_makes_its_glb() {
+    let room = Room::new();
+    let folder = room.path(FOLDER);
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(shipped("cornell.gltf"), folder.join(SCENE)).unwrap();
+    let own =
+        ["bake", SCENE, "--texels-per-metre", "4", "--photons", "900", "--spp", "1", "--exr", "--quiet"];
+    let whole = run(&room, &[&own[..], &["-o", "whole.glb"]].concat());
+    assert_eq!(whole.status, Some(0), "{}", whole.stderr);
+    let of_farm = ["-o", "out {}.glb", "--farm", "parallel", "--parts", "3"];
+    let job = run(&room, &[&own[..], &of_farm].concat());
+    assert_eq!((job.status, &*job.stderr), (Some(0), ""));
+    by_hand(&room, &job.stdout);
+    let read = |name: &str| std::fs::read(folder.join(name)).unwrap();
+    assert!(read("out {}.glb") == read("whole.glb"));
+    assert!(read("out {}.0.exr") == read("whole.0.exr"));
+}
+
 #[test]
 fn progress_and_failure_are_lines_of_open_job_description() {
     let (room, _) = room();

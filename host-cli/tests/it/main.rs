@@ -1,6 +1,8 @@
 //! Tests that run the command `photoncard`.
 
+mod autonomy;
 mod bad_input;
+mod bake;
 #[cfg(feature = "study")]
 mod commands_of_documents;
 mod costly_files;
@@ -15,6 +17,8 @@ mod frames;
 mod information;
 mod interrupt;
 mod links;
+mod measure;
+mod mix;
 mod notices;
 mod options;
 mod package;

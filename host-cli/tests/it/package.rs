@@ -41,6 +41,7 @@ fn archives_are_complete_and_reproducible() {
         "CHANGELOG.md",
         "LICENSE-APACHE",
         "LICENSE-MIT",
+        "LICENSE-OF-SKY-DATA.txt",
         "LICENSES-OF-CRATES.txt",
         "README.md",
         "bin/photoncard",

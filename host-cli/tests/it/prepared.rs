@@ -26,7 +26,16 @@ fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
     // also needed by the quality's pilot, and stated again to `photoncard render`.
     for (prepared, picture) in [
         (
-            &["--quality", "draft", "--photons", "900", "--environment", "0.1,0.2,0.3"][..],
+            &[
+                "--quality",
+                "draft",
+                "--photons",
+                "900",
+                "--environment",
+                "0.1,0.2,0.3",
+                "--light-groups",
+                "sky=environment",
+            ][..],
             &["--size", "24x20", "--aov", "all", "--transparent", "--camera-at", "0.1,0.2,3"][..],
         ),
         (
@@ -43,6 +52,19 @@ fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
                 "white.diffuse=0.3,0.1,0.5",
             ],
             &["--size", "20x20", "--crop", "3,17,0,9", "--filter", "gaussian"],
+        ),
+        (
+            &[
+                "--quality",
+                "paper",
+                "--photons",
+                "900",
+                "--sky",
+                "52.5,13.4,2026-06-21T09:00+02:00",
+                "--north",
+                "30",
+            ],
+            &["--size", "16x16"],
         ),
     ] {
         let room = Room::new();
@@ -141,6 +163,7 @@ fn options_of_the_preparation_are_refused_with_a_remedy() {
         ["--spp", "4"],
         ["--set", "white.diffuse=0,0,0"],
         ["--environment", "1,1,1"],
+        ["--sky", "0,0,2026-06-21T12:00Z"],
         ["--time", "1s"],
     ] {
         let outcome =

@@ -25,12 +25,17 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
         (&["--aov", "direct,Z"], "aov", json!("direct,Z")),
         (&["--transparent"], "transparent", json!(true)),
+        (&["--irradiance"], "irradiance", json!(true)),
+        (&["--lumens-per-watt", "179", "--aov", "illuminance"], "lumens-per-watt", json!(179.0)),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--light-groups", "key=light"], "light-groups", json!(["key=light"])),
         (&["--texture-limit", "64"], "texture-limit", json!(64)),
         (&["--light-units", "watts"], "light-units", json!("watts")),
         (&["--energy-compensation"], "energy-compensation", json!(true)),
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
         (&["--environment-rotation", "-9.5", "--environment", "1,2,3"], "environment-rotation", json!(-9.5)),
+        (&["--sky", MORNING], "sky", json!(MORNING)),
+        (&["--north", "-30", "--sky", MORNING], "north", json!(-30.0)),
         (&["--seed", "5"], "seed", json!(5)),
         (&["--photons", "300"], "photons", json!(300)),
         (&["--photons-for", "camera"], "photons-for", json!("camera")),
@@ -48,6 +53,9 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--adaptive", "0.5"], "adaptive", json!(0.5)),
     ]
 }
+
+/// A sky of the southern hemisphere.
+const MORNING: &str = "-33.9,18.4,2026-06-21T10:30+02:00";
 
 /// Card with a chip of a file.
 const CHIP: &str = concat!("emulated:", env!("CARGO_MANIFEST_DIR"), "/../docs/chip.toml:2");
@@ -127,8 +135,11 @@ fn the_provenance_has_exactly_the_options_that_pixels_depend_on() {
         assert_ne!(plain[key], value, "{options:?}");
         keys.insert(key);
     }
-    // A picture with a background has no entry for it.
-    keys.remove("transparent");
+    // A picture with a background has no entry for it, nor one without light groups, irradiance or sky for
+    // them.
+    for absent in ["transparent", "light-groups", "irradiance", "lumens-per-watt", "sky", "north"] {
+        keys.remove(absent);
+    }
     let found: BTreeSet<_> = plain.as_object().expect("an object").keys().map(String::as_str).collect();
     assert_eq!(found, keys);
     for options in OTHERS {

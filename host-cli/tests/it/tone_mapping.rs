@@ -182,3 +182,35 @@ fn the_input_picture_is_not_replaced() {
     assert!(outcome.stderr.contains("it is the picture to read as well"), "{}", outcome.stderr);
     assert_eq!(room.read("a.png"), bytes);
 }
+
+#[test]
+fn false_colours_are_of_illuminance_or_luminance() {
+    let room = room_with_a_scene();
+    room.rendered("scene.gltf", &["--aov", "illuminance", "-o", "lux.exr"]);
+    room.rendered("scene.gltf", &["--aov", "none", "-o", "plain.exr"]);
+    room.rendered("scene.gltf", &["--aov", "none", "--irradiance", "-o", "irradiance.exr"]);
+    let shown = |name: &str| {
+        let arguments = ["tonemap", name, "--false-color", "0,5", "--lumens-per-watt", "1", "-o", "out.png"];
+        let outcome = room.run(&arguments);
+        assert_eq!((outcome.status, &*outcome.stderr), (Some(0), ""), "{name}");
+        pixels_of(&room.path("out.png"))
+    };
+    let [lux, plain, irradiance] = ["lux.exr", "plain.exr", "irradiance.exr"].map(shown);
+    assert_eq!(lux.0, [8, 8]);
+    assert!(lux == irradiance, "illuminance is the luminance of the irradiance");
+    assert!(lux != plain);
+    for (range, part) in [("5,0", "no range"), ("0", "no range"), ("0,nan", "no range")] {
+        let outcome = room.run(&["tonemap", "lux.exr", "--false-color", range, "-o", "out.png"]);
+        assert_eq!(outcome.status, Some(2), "{range}");
+        assert!(outcome.stderr.contains(part), "{}", outcome.stderr);
+    }
+}
+
+/// Size and bytes of the pixels of a PNG.
+fn pixels_of(path: &Path) -> ([u32; 2], Vec<u8>) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    ([info.width, info.height], pixels)
+}

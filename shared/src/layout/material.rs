@@ -1,5 +1,7 @@
 //! Materials: reflectance, transmittance and emission of surfaces.
 
+use crate::budget::MAX_LIGHT_GROUPS;
+
 use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
 /// Flag of [`Material::flags`]: the back reflects and emits like the front (glTF `doubleSided`).
@@ -37,9 +39,12 @@ const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | B
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
+/// Position, in the flags word, of the lowest bit of the light group.
+const GROUP_SHIFT: u32 = 9;
+const GROUP_MASK: u32 = MAX_LIGHT_GROUPS as u32 - 1;
 /// Position, in the flags word, of the lowest bit of the layers field. The field holds the index of the
 /// [`super::Layers`] plus 1; 0 stands for no layers.
-const LAYERS_SHIFT: u32 = 9;
+const LAYERS_SHIFT: u32 = 11;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
@@ -66,8 +71,10 @@ pub struct Material {
     /// Indices of three textures: base colour or diffuse albedo; metallic-roughness, with roughness in green
     /// and metalness in blue; emission. [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
-    /// Index of the material's [`super::Layers`], below 2^23 - 1; `None` without layers.
+    /// Index of the material's [`super::Layers`], below 2^21 - 1; `None` without layers.
     pub layers: Option<u32>,
+    /// Light group of the emission, below [`MAX_LIGHT_GROUPS`].
+    pub light_group: u8,
 }
 
 /// Model of reflection and transmission, with its parameters.
@@ -155,6 +162,7 @@ impl Material {
             cutoff: read_f32(bytes, 48),
             textures: [textures[0] as u16, (textures[0] >> 16) as u16, textures[1] as u16],
             layers: (kind >> LAYERS_SHIFT).checked_sub(1),
+            light_group: (kind >> GROUP_SHIFT & GROUP_MASK) as u8,
         }
     }
 
@@ -177,7 +185,9 @@ impl Material {
         write_f32(&mut bytes, 28, b);
         write_vector(&mut bytes, 32, self.emission);
         let layers = self.layers.map_or(0, |index| index + 1);
-        write_u32(&mut bytes, 44, self.flags | kind << KIND_SHIFT | layers << LAYERS_SHIFT);
+        let group = u32::from(self.light_group) & GROUP_MASK;
+        let word = self.flags | kind << KIND_SHIFT | group << GROUP_SHIFT | layers << LAYERS_SHIFT;
+        write_u32(&mut bytes, 44, word);
         write_f32(&mut bytes, 48, self.cutoff);
         let [base, metallic_roughness, emissive] = self.textures.map(u32::from);
         write_u32(&mut bytes, 52, base | metallic_roughness << 16);
@@ -225,6 +235,7 @@ mod tests {
                     cutoff: 0.5,
                     textures: [3, NO_TEXTURE, 70],
                     layers: flags.checked_sub(FLAGS),
+                    light_group: (flags % 4) as u8,
                 };
                 assert_eq!(Material::read(&material.to_bytes()), material);
             }

@@ -20,6 +20,7 @@
 //! | [`Emitter`] | 64 | 2 |
 //! | [`LightNode`] | 128 | 1 |
 //! | [`DistantLight`] | 32 | 4 |
+//! | [`Sensor`] | 24 | 5 |
 //! | threshold of the environment's distribution | 4 | 32 |
 //!
 //! Colours and vectors are three `f32`. Lengths are in metres, radiances in W/(sr m^2), and photon powers in
@@ -44,6 +45,7 @@ mod photon;
 mod photon_grid;
 mod photon_leaf;
 mod photon_node;
+mod sensor;
 mod tangents;
 mod texture;
 mod wide_node;
@@ -70,6 +72,7 @@ pub use photon::{
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PhotonLeaf, leaf_capacity};
 pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};
+pub use sensor::Sensor;
 pub use tangents::Tangents;
 pub use texture::{TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat, Texture, Wrap};
 pub use wide_node::{Child, Links, NODE_CHILDREN, WideNode};

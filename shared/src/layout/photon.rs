@@ -12,7 +12,7 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | 0..12 | position, metres |
 /// | 12..16 | power, [`Rgbe`], in units of the card image's photon power unit |
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
-/// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
+/// | 18..20 | flags: bits 0-1 axis or group, 2-9 normal ([`super::encode_normal`]), 10-14 disc, 15 direct |
 ///
 /// The *disc fraction* is `A / (pi r^2)`, where `A` is the area of the surfaces from which a gather of radius
 /// `r` around this photon takes photons. It is 1 on a flat wall, less at edges and in corners, more where
@@ -36,8 +36,9 @@ pub struct Photon {
     pub power: Rgbe,
     /// Octahedral code of the incoming direction, which points from the surface back along the photon's path.
     pub direction: [u8; 2],
-    /// Splitting axis of the kd-tree node: 0, 1 or 2.
-    pub axis: u8,
+    /// Splitting axis of the node in a kd-tree, 0, 1 or 2; in a wide tree, the light group of the photon's
+    /// light, 0 to 3.
+    pub axis_or_group: u8,
     /// Octahedral code of the surface normal, on the lit side.
     pub normal: u8,
     /// Code of the disc fraction, below [`DISC_CODES`].
@@ -142,7 +143,7 @@ impl Photon {
             position: Self::position(bytes),
             power: Rgbe([bytes[12], bytes[13], bytes[14], bytes[15]]),
             direction: [bytes[16], bytes[17]],
-            axis: Self::axis_of_flags(flags),
+            axis_or_group: Self::axis_of_flags(flags),
             normal: Self::normal_of_flags(flags),
             disc: Self::disc_of_flags(flags),
             direct: Self::direct_of_flags(flags),
@@ -167,11 +168,24 @@ impl Photon {
         (flags & 3) as u8
     }
 
+    /// Light group in a record's flags, in a map that is a wide tree.
+    #[inline(always)]
+    pub fn light_group_of_flags(flags: u16) -> u8 {
+        (flags & 3) as u8
+    }
+
     /// Content of a photon: the last eight bytes of the record, which hold power, direction and flags.
     #[inline(always)]
     pub fn content(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
         let [.., a, b, c, d, e, f, g, h] = *bytes;
         [a, b, c, d, e, f, g, h]
+    }
+
+    /// Content of a photon of a kd-tree, with its splitting axis cleared.
+    #[inline(always)]
+    pub fn content_without_axis(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
+        let [a, b, c, d, e, f, low, high] = Self::content(bytes);
+        [a, b, c, d, e, f, low & !3, high]
     }
 
     /// Returns a photon's content in which the code of the disc fraction is replaced by `disc`.
@@ -207,7 +221,7 @@ impl Photon {
         write_vector(&mut bytes, 0, self.position);
         bytes[12..16].copy_from_slice(&self.power.0);
         bytes[16..18].copy_from_slice(&self.direction);
-        let flags = (self.axis & 3) as u16
+        let flags = (self.axis_or_group & 3) as u16
             | (self.normal as u16) << 2
             | ((self.disc & DISC_MASK) as u16) << DISC_SHIFT
             | (self.direct as u16) << 15;
@@ -283,7 +297,7 @@ mod tests {
             position: [1.5, -2.25, 1e-7],
             power: Rgbe::encode([1.0, 0.25, 0.5], 7),
             direction: [3, 200],
-            axis: 2,
+            axis_or_group: 2,
             normal: 0xa5,
             disc: 21,
             direct: true,

@@ -159,11 +159,15 @@ pub enum Parameter {
     Coverage,
     /// Coverage by identity.
     Identities,
+    /// Number of light groups.
+    LightGroups,
+    /// Whiteness of the surfaces that eye rays meet first.
+    Irradiance,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 29] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -191,6 +195,8 @@ impl Parameter {
         Self::Position,
         Self::Coverage,
         Self::Identities,
+        Self::LightGroups,
+        Self::Irradiance,
     ];
 
     /// Returns the fault that reports that the card cannot render with the parameter's value.
@@ -228,6 +234,8 @@ impl Parameter {
             Self::Position => "sums of positions",
             Self::Coverage => "sums of coverage",
             Self::Identities => "coverage by identity",
+            Self::LightGroups => "light groups",
+            Self::Irradiance => "whiteness of the surfaces that eye rays meet first",
         }
     }
 }

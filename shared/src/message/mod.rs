@@ -27,8 +27,8 @@ mod self_test;
 pub use self::fault::{Fault, FaultCode, Invariant, Parameter};
 pub use self::identity::{IdentityCoverage, MAX_IDENTITIES};
 pub use self::pixel::{
-    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES, PROBES,
-    Pixel, PixelForm, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE,
+    ALBEDO_STEPS, COVERAGE_STEPS, DEPTH_STEPS, GroupSums, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
+    PROBES, Pixel, PixelForm, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE,
 };
 pub use self::self_test::{
     CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
@@ -141,6 +141,18 @@ pub enum Projection {
         /// Half the angles that the picture shows, of longitude and of latitude, radians.
         angles: [f32; 2],
     },
+    /// No rays: pixel `(x, y)` of a picture `w` pixels wide is the [`Sensor`](crate::layout::Sensor) with the
+    /// number `y w + x`. Its light is `E / pi`, of the irradiance `E` on the sensor, W/m^2. Pixels without a
+    /// sensor are black. Such a frame interpolates no irradiance and has no identities.
+    Sensors {
+        /// Line of card memory in which the first sensor lies. The lines of the sensors are part of the card
+        /// image, behind its sections.
+        line: u32,
+        /// Number of the first sensor in card memory.
+        first: u32,
+        /// Number of sensors in card memory.
+        count: u32,
+    },
 }
 
 impl Camera {
@@ -154,7 +166,7 @@ impl Camera {
         let Self { origin, forward, right, up, shift, projection } = self;
         let are_finite = |numbers: &[f32]| numbers.iter().all(|number| number.is_finite());
         let is_projection_finite = match projection {
-            Projection::Pinhole | Projection::Orthographic => true,
+            Projection::Pinhole | Projection::Orthographic | Projection::Sensors { .. } => true,
             Projection::ThinLens { right, up, focus } => {
                 are_finite([*right, *up].as_flattened()) && focus.is_finite()
             }
@@ -239,6 +251,14 @@ pub struct FrameParameters {
     /// True if the card sends [`PixelSums::identities`] with each pixel. The card image must have
     /// [`SectionKind::Identities`](crate::image::SectionKind::Identities).
     pub identities: bool,
+    /// Number of light groups whose light the card sends separately with each pixel ([`GroupSums`]), at most
+    /// [`MAX_LIGHT_GROUPS`](crate::budget::MAX_LIGHT_GROUPS). Light of a group beyond them counts as that of
+    /// the last. At 0, the card sends the light of all groups as one.
+    pub light_groups: u8,
+    /// True if every surface that an eye ray meets first counts as white, Lambertian and without emission,
+    /// and the environment behind the scene as black. The light of a pixel is then `E / pi`, of the
+    /// irradiance `E` on the surface, W/m^2.
+    pub irradiance: bool,
 }
 
 /// Maximum number of paths per sample in adaptive sampling.
@@ -247,8 +267,8 @@ pub const MAX_PATHS: u32 = 16;
 impl FrameParameters {
     /// Optional contents of the pixels that the card sends.
     pub const fn form(&self) -> PixelForm {
-        let Self { layers, position, coverage, identities, .. } = *self;
-        PixelForm { layers, position, coverage, identities }
+        let Self { layers, light_groups, position, coverage, identities, .. } = *self;
+        PixelForm { layers, light_groups, position, coverage, identities }
     }
 
     /// Maximum number of paths per pixel, including probes of earlier samples.

@@ -4,6 +4,7 @@
 //! exactly.
 
 use super::identity::{IDENTITIES_BYTES, IdentityCoverage};
+use crate::budget::{MAX_LIGHT_GROUPS, SUMS_WITH_LAYERS};
 
 /// Fixed-point scale of sums of light: one radiance unit is stored as 2^40.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
@@ -70,6 +71,8 @@ pub struct Pixel {
 pub struct PixelForm {
     /// True if the record has [`LayerSums`].
     pub layers: bool,
+    /// Number of light groups in the record ([`GroupSums`]), at most [`MAX_LIGHT_GROUPS`].
+    pub light_groups: u8,
     /// True if the record has [`PixelSums::position`].
     pub position: bool,
     /// True if the record has [`PixelSums::coverage`].
@@ -80,61 +83,51 @@ pub struct PixelForm {
 
 impl PixelForm {
     /// Form without optional contents.
-    pub const PLAIN: Self = Self { layers: false, position: false, coverage: false, identities: false };
+    pub const PLAIN: Self =
+        Self { layers: false, light_groups: 0, position: false, coverage: false, identities: false };
     /// Form with layers alone.
     pub const LAYERED: Self = Self { layers: true, ..Self::PLAIN };
     /// Form with all contents.
-    pub const FULL: Self = Self { layers: true, position: true, coverage: true, identities: true };
+    pub const FULL: Self = Self {
+        layers: true,
+        light_groups: MAX_LIGHT_GROUPS as u8,
+        position: true,
+        coverage: true,
+        identities: true,
+    };
 
     /// Form with the contents of either form.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {
-        Self::of_number(self.number() | other.number())
-    }
-
-    /// Number of forms.
-    const COUNT: usize = 16;
-
-    /// Form whose contents are the bits of `number`.
-    const fn of_number(number: usize) -> Self {
+        let groups = [self.light_groups, other.light_groups];
         Self {
-            layers: number & 1 != 0,
-            position: number & 2 != 0,
-            coverage: number & 4 != 0,
-            identities: number & 8 != 0,
+            layers: self.layers || other.layers,
+            light_groups: if groups[0] > groups[1] { groups[0] } else { groups[1] },
+            position: self.position || other.position,
+            coverage: self.coverage || other.coverage,
+            identities: self.identities || other.identities,
         }
     }
 
-    const fn number(self) -> usize {
-        let Self { layers, position, coverage, identities } = self;
-        layers as usize | (position as usize) << 1 | (coverage as usize) << 2 | (identities as usize) << 3
+    /// Number of sums of light that a chip keeps per pixel: [`SUMS_WITH_LAYERS`] for layers, and one for each
+    /// light group; 1 without layers and groups.
+    pub const fn sums_of_light(self) -> u32 {
+        let layers = if self.layers { SUMS_WITH_LAYERS } else { 0 };
+        let sums = layers + self.light_groups as u32;
+        if sums == 0 { 1 } else { sums }
     }
 
     /// Bytes of a pixel's record.
     pub const fn record_bytes(self) -> usize {
+        let light = match (self.layers, self.light_groups) {
+            (false, 0) => LIGHT_BYTES,
+            (layers, groups) => groups as usize * LIGHT_BYTES + if layers { LAYER_BYTES } else { 0 },
+        };
         VIEW_BYTES
-            + if self.layers { LAYER_BYTES } else { LIGHT_BYTES }
+            + light
             + if self.position { POSITION_BYTES } else { 0 }
             + if self.coverage { COVERAGE_BYTES } else { 0 }
             + if self.identities { IDENTITIES_BYTES } else { 0 }
-    }
-
-    /// Form of the records of `bytes` bytes; `None` if there is none. Records of different forms differ in
-    /// their lengths.
-    #[inline]
-    pub const fn of_length(bytes: usize) -> Option<Self> {
-        if bytes == PIXEL_BYTES {
-            return Some(Self::PLAIN);
-        }
-        let mut number = 0;
-        while number < Self::COUNT {
-            let form = Self::of_number(number);
-            if form.record_bytes() == bytes {
-                return Some(form);
-            }
-            number += 1;
-        }
-        None
     }
 }
 
@@ -159,10 +152,19 @@ pub struct PixelLayers {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SumScale {
-    /// Unit of light, W/(sr m^2), a power of two.
+    /// Unit of light: radiance, W/(sr m^2), a power of two, or irradiance, W/m^2.
     pub radiance: f32,
     /// Unit of depth, metres, a power of two.
     pub depth: f32,
+}
+
+impl SumScale {
+    /// Scale in which the light of an [irradiance frame](super::FrameParameters::irradiance) is the
+    /// irradiance, W/m^2: `E = pi L`.
+    #[must_use]
+    pub const fn of_irradiance(self) -> Self {
+        Self { radiance: self.radiance * core::f32::consts::PI, ..self }
+    }
 }
 
 /// Sums of a pixel over its samples.
@@ -170,7 +172,7 @@ pub struct SumScale {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PixelSums {
     /// Sum of radiance, in steps of 2^-40 radiance units, at least 0, saturating. With layers it is the sum
-    /// of direct, indirect and caustic light.
+    /// of direct, indirect and caustic light; with light groups, the sum over the groups.
     pub light: [i64; 3],
     /// Sum of albedos, in steps of 1 / [`ALBEDO_STEPS`].
     pub albedo: [u32; 3],
@@ -182,6 +184,8 @@ pub struct PixelSums {
     pub surfaces: u32,
     /// Separate sums of direct, indirect and caustic light; `None` in a frame without layers.
     pub layers: Option<LayerSums>,
+    /// Separate sums of the light groups; `None` in a frame without light groups.
+    pub light_groups: Option<GroupSums>,
     /// Sum of the positions at which eye rays hit a surface, of the samples that [`Self::surfaces`] counts,
     /// in steps of 1 / [`DEPTH_STEPS`] depth units; `None` in a frame without positions.
     pub position: Option<[i64; 3]>,
@@ -190,6 +194,51 @@ pub struct PixelSums {
     pub coverage: Option<u32>,
     /// Coverage by identity; `None` in a frame without identities.
     pub identities: Option<IdentityCoverage>,
+}
+
+/// Sums of a pixel's light by light group, in the units of [`PixelSums::light`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GroupSums {
+    count: u8,
+    sums: [[i64; 3]; MAX_LIGHT_GROUPS],
+}
+
+impl GroupSums {
+    /// Sums of the first groups, at most [`MAX_LIGHT_GROUPS`].
+    pub fn new(groups: impl IntoIterator<Item = [i64; 3]>) -> Self {
+        let mut all = Self::default();
+        for (sum, of_group) in all.sums.iter_mut().zip(groups) {
+            *sum = of_group;
+            all.count += 1;
+        }
+        all
+    }
+
+    /// Sums of `count` groups, all 0.
+    fn zero(count: u8) -> Self {
+        Self { count: count.min(MAX_LIGHT_GROUPS as u8), ..Self::default() }
+    }
+
+    /// Number of groups.
+    pub fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// The sums, one for each group.
+    pub fn sums(&self) -> &[[i64; 3]] {
+        self.sums.get(..self.count as usize).unwrap_or_default()
+    }
+
+    fn light(&self) -> [i64; 3] {
+        self.sums.into_iter().fold([0; 3], added_light)
+    }
+
+    /// Sums over both operands; `None` if their numbers of groups differ.
+    fn plus(&self, more: &Self) -> Option<Self> {
+        let sums = self.sums.iter().zip(&more.sums).map(|(sum, more)| added_light(*sum, *more));
+        (self.count == more.count).then(|| Self { count: self.count, ..Self::new(sums) })
+    }
 }
 
 /// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and the number of final
@@ -221,16 +270,6 @@ const COVERAGE_BYTES: usize = 4;
 pub const PIXEL_BYTES: usize = PixelForm::PLAIN.record_bytes();
 /// Maximum length of the pixels in one [`super::Reply::Pixels`], bytes.
 pub const PIXELS_BYTES: usize = 16 * PIXEL_BYTES;
-
-const _: () = {
-    let mut number = 0;
-    while number < PixelForm::COUNT {
-        let form = PixelForm::of_number(number);
-        let found = PixelForm::of_length(form.record_bytes());
-        assert!(matches!(found, Some(found) if found.number() == number));
-        number += 1;
-    }
-};
 
 /// Reader of little-endian numbers. It returns zeros after the end.
 struct Numbers<'a>(&'a [u8]);
@@ -271,14 +310,15 @@ impl PixelSums {
         depth: 0,
         surfaces: 0,
         layers: None,
+        light_groups: None,
         position: None,
         coverage: None,
         identities: None,
     };
 
-    /// Replaces the light, and removes the layers.
+    /// Replaces the light, and removes layers and light groups.
     pub fn with_light(self, light: [i64; 3]) -> Self {
-        Self { light, layers: None, ..self }
+        Self { light, layers: None, light_groups: None, ..self }
     }
 
     /// Replaces the layers. The light becomes their sum.
@@ -286,10 +326,16 @@ impl PixelSums {
         Self { light: layers.light(), layers: Some(layers), ..self }
     }
 
+    /// Replaces the light groups. The light becomes their sum.
+    pub fn with_light_groups(self, groups: GroupSums) -> Self {
+        Self { light: groups.light(), light_groups: Some(groups), ..self }
+    }
+
     /// Optional contents of the sums.
     pub fn form(&self) -> PixelForm {
         PixelForm {
             layers: self.layers.is_some(),
+            light_groups: self.light_groups.map_or(0, |groups| groups.count),
             position: self.position.is_some(),
             coverage: self.coverage.is_some(),
             identities: self.identities.is_some(),
@@ -299,41 +345,52 @@ impl PixelSums {
     /// Returns the sums with the optional contents of `form`: others are removed, and missing ones are 0.
     #[must_use]
     pub fn in_form(self, form: PixelForm) -> Self {
-        let light = match form.layers {
-            true => self.with_layers(self.layers.unwrap_or_default()),
-            false => self.with_light(self.light),
-        };
-        Self {
+        let mut all = Self {
+            layers: None,
+            light_groups: None,
             position: form.position.then(|| self.position.unwrap_or_default()),
             coverage: form.coverage.then(|| self.coverage.unwrap_or_default()),
             identities: form.identities.then(|| self.identities.unwrap_or_default()),
-            ..light
+            ..self
+        };
+        if form.layers {
+            all = all.with_layers(self.layers.unwrap_or_default());
         }
+        if form.light_groups > 0 {
+            let of_form = self.light_groups.filter(|groups| groups.count == form.light_groups);
+            all = all.with_light_groups(of_form.unwrap_or(GroupSums::zero(form.light_groups)));
+        }
+        all
     }
 
-    /// Reads sums; `None` if the length of `bytes` is that of no [`PixelForm`], or the identities are not in
-    /// the order of [`IdentityCoverage`].
+    /// Reads the sums of a record with the contents `form`; `None` if the length of `bytes` is not that of
+    /// such a record, or the identities are not in the order of [`IdentityCoverage`].
     #[inline]
-    pub fn read(bytes: &[u8]) -> Option<Self> {
-        let form = PixelForm::of_length(bytes.len())?;
+    pub fn read(form: PixelForm, bytes: &[u8]) -> Option<Self> {
+        if bytes.len() != form.record_bytes() {
+            return None;
+        }
         let mut numbers = Numbers(bytes);
-        let view = Self {
+        let mut sums = Self {
             albedo: numbers.vector(u32::from_le_bytes),
             normal: numbers.vector(i32::from_le_bytes),
             depth: i64::from_le_bytes(numbers.next()),
             surfaces: u32::from_le_bytes(numbers.next()),
             ..Self::default()
         };
-        let mut light = || numbers.vector(i64::from_le_bytes);
-        let lit = if form.layers {
-            let [direct, indirect, caustic] = [light(), light(), light()];
+        if form == PixelForm::PLAIN {
+            return Some(sums.with_light(numbers.vector(i64::from_le_bytes)));
+        }
+        if form.layers {
+            let [direct, indirect, caustic] = core::array::from_fn(|_| numbers.vector(i64::from_le_bytes));
             let gathers = u32::from_le_bytes(numbers.next());
-            view.with_layers(LayerSums { direct, indirect, caustic, gathers })
-        } else {
-            view.with_light(light())
-        };
-        if form == PixelForm::PLAIN || form == PixelForm::LAYERED {
-            return Some(lit);
+            sums = sums.with_layers(LayerSums { direct, indirect, caustic, gathers });
+        }
+        if form.light_groups > 0 {
+            let groups = (0..form.light_groups).map(|_| numbers.vector(i64::from_le_bytes));
+            sums = sums.with_light_groups(GroupSums::new(groups));
+        } else if !form.layers {
+            sums = sums.with_light(numbers.vector(i64::from_le_bytes));
         }
         let position = form.position.then(|| numbers.vector(i64::from_le_bytes));
         let coverage = form.coverage.then(|| u32::from_le_bytes(numbers.next()));
@@ -341,23 +398,38 @@ impl PixelSums {
             true => Some(IdentityCoverage::of_numbers(|| u32::from_le_bytes(numbers.next()))?),
             false => None,
         };
-        Some(Self { position, coverage, identities, ..lit })
+        Some(Self { position, coverage, identities, ..sums })
     }
 
     /// Passes the encoded sums to `append`, [`PixelForm::record_bytes`] bytes in total.
     pub fn write(&self, append: &mut impl FnMut(&[u8])) {
-        let Self { light, albedo, normal, depth, surfaces, layers, position, coverage, identities } = self;
+        let Self {
+            light,
+            albedo,
+            normal,
+            depth,
+            surfaces,
+            layers,
+            light_groups,
+            position,
+            coverage,
+            identities,
+        } = self;
         append(albedo.map(u32::to_le_bytes).as_flattened());
         append(normal.map(i32::to_le_bytes).as_flattened());
         append(&depth.to_le_bytes());
         append(&surfaces.to_le_bytes());
         let mut append_light = |light: &[i64; 3]| append(light.map(i64::to_le_bytes).as_flattened());
-        match layers {
-            None => append_light(light),
-            Some(LayerSums { direct, indirect, caustic, gathers }) => {
-                [direct, indirect, caustic].into_iter().for_each(append_light);
-                append(&gathers.to_le_bytes());
-            }
+        if layers.is_none() && light_groups.is_none() {
+            append_light(light);
+        }
+        if let Some(LayerSums { direct, indirect, caustic, gathers }) = layers {
+            [direct, indirect, caustic].into_iter().for_each(&mut append_light);
+            append(&gathers.to_le_bytes());
+        }
+        if let Some(groups) = light_groups {
+            let mut append_light = |light: &[i64; 3]| append(light.map(i64::to_le_bytes).as_flattened());
+            groups.sums().iter().for_each(&mut append_light);
         }
         if let Some(position) = position {
             append(position.map(i64::to_le_bytes).as_flattened());
@@ -374,27 +446,33 @@ impl PixelSums {
     /// have them.
     #[must_use]
     pub fn plus(&self, more: &Self) -> Self {
-        let view = Self {
+        let mut all = Self {
+            light: added_light(self.light, more.light),
             albedo: added(self.albedo, more.albedo, u32::saturating_add),
             normal: added(self.normal, more.normal, i32::saturating_add),
             depth: self.depth.saturating_add(more.depth),
             surfaces: self.surfaces.saturating_add(more.surfaces),
+            layers: None,
+            light_groups: None,
             position: self.position.zip(more.position).map(|(sum, more)| added_light(sum, more)),
             coverage: self.coverage.zip(more.coverage).map(|(sum, more)| sum.saturating_add(more)),
             identities: match (&self.identities, &more.identities) {
                 (Some(identities), Some(more)) => Some(identities.plus(more)),
                 _ => None,
             },
-            ..Self::default()
         };
-        match (&self.layers, &more.layers) {
-            (Some(layers), Some(more)) => view.with_layers(LayerSums {
+        if let (Some(layers), Some(more)) = (&self.layers, &more.layers) {
+            all = all.with_layers(LayerSums {
                 direct: added_light(layers.direct, more.direct),
                 indirect: added_light(layers.indirect, more.indirect),
                 caustic: added_light(layers.caustic, more.caustic),
                 gathers: layers.gathers.saturating_add(more.gathers),
-            }),
-            _ => view.with_light(added_light(self.light, more.light)),
+            });
+        }
+        let groups = self.light_groups.zip(more.light_groups);
+        match groups.and_then(|(groups, more)| groups.plus(&more)) {
+            Some(groups) => all.with_light_groups(groups),
+            None => all,
         }
     }
 
@@ -431,8 +509,13 @@ impl PixelSums {
         let normal = per_sample / f64::from(NORMAL_STEPS);
         let albedo = per_sample / f64::from(ALBEDO_STEPS);
         let depth = f64::from(scale.depth) / f64::from(DEPTH_STEPS) / f64::from(self.surfaces);
+        // The groups' means add up to the radiance, bit for bit, in the order of the groups.
+        let of_groups = self.light_groups.map(|_| {
+            let [first, rest @ ..] = self.group_radiance(count, scale);
+            rest.into_iter().fold(first, |sum, group| added(sum, group, |a, b| a + b))
+        });
         Pixel {
-            radiance: radiance(self.light, count, scale),
+            radiance: of_groups.unwrap_or_else(|| radiance(self.light, count, scale)),
             albedo: self.albedo.map(|sum| (f64::from(sum) * albedo) as f32),
             normal: self.normal.map(|sum| (f64::from(sum) * normal) as f32),
             depth: if self.surfaces > 0 { (self.depth as f64 * depth) as f32 } else { f32::INFINITY },
@@ -465,6 +548,13 @@ impl PixelSums {
         let LayerSums { direct, indirect, caustic, gathers } = self.layers?;
         let [direct, indirect, caustic] = [direct, indirect, caustic].map(|sum| radiance(sum, count, scale));
         Some(PixelLayers { direct, indirect, caustic, gathers: gathers as f32 })
+    }
+
+    /// Returns the light of each group, averaged over the samples, W/(sr m^2); zero for groups that the frame
+    /// does not have.
+    pub fn group_radiance(&self, count: SampleCount, scale: &SumScale) -> [[f32; 3]; MAX_LIGHT_GROUPS] {
+        let groups = self.light_groups.unwrap_or_default();
+        groups.sums.map(|sum| radiance(sum, count, scale))
     }
 }
 

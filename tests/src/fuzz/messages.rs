@@ -41,6 +41,7 @@ pub(super) fn frame() -> FrameParameters {
         radiance: Radiance::Precomputed,
         caustics: Some(CausticGather { neighbors: 50, max_distance: 1.0 }),
         layers: false,
+        light_groups: 0,
         in_flight: 3,
         keep_records: true,
         adaptive_threshold: Some(0.5),
@@ -48,6 +49,7 @@ pub(super) fn frame() -> FrameParameters {
         position: false,
         coverage: false,
         identities: false,
+        irradiance: false,
     }
 }
 

@@ -13,6 +13,7 @@ mod messages;
 pub(crate) mod mutation;
 pub(crate) mod picture;
 pub mod png;
+mod profile;
 mod random;
 mod run;
 mod session;
@@ -27,7 +28,7 @@ pub use self::run::{Failure, Report, Settings, fuzz};
 pub use self::target::Target;
 
 /// Names of all targets.
-pub const NAMES: [&str; 12] = [
+pub const NAMES: [&str; 13] = [
     "frames",
     "messages",
     "session",
@@ -37,6 +38,7 @@ pub const NAMES: [&str; 12] = [
     "draco",
     "textures",
     "environments",
+    "profiles",
     "exr",
     "parts",
     "prepared",
@@ -54,6 +56,7 @@ pub fn target(name: &str) -> Option<Arc<dyn Target>> {
         "draco" => Some(Arc::new(compressed::Streams::draco())),
         "textures" => Some(Arc::new(texture::Textures::new())),
         "environments" => Some(Arc::new(environment::Environments::new())),
+        "profiles" => Some(Arc::new(profile::Profiles::new())),
         "exr" => Some(Arc::new(picture::Pictures::new())),
         "parts" => Some(Arc::new(headed::Files::parts())),
         "prepared" => Some(Arc::new(headed::Files::prepared())),

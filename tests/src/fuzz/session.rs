@@ -96,12 +96,8 @@ impl Sessions {
             replies: FORMS.map(|form| sound_replies(hello(LINES), form)),
             others: [messages::replies(), vec![encoded(&hello(0)), encoded(&hello(u32::MAX))]].concat(),
             upload: Arc::new(Upload::new(Arc::new(vec![Line::ZERO; LINES as usize]))),
-            frames: FORMS.map(|PixelForm { layers, position, coverage, identities }| FrameParameters {
-                layers,
-                position,
-                coverage,
-                identities,
-                ..messages::frame()
+            frames: FORMS.map(|PixelForm { layers, light_groups, position, coverage, identities }| {
+                FrameParameters { layers, light_groups, position, coverage, identities, ..messages::frame() }
             }),
         }
     }

@@ -55,6 +55,7 @@ mod no_input_panics_hangs_or_takes_much_memory {
         draco: 2_500,
         textures: 3_000,
         environments: 10_000,
+        profiles: 10_000,
         exr: 2_500,
         parts: 3_000,
         prepared: 2_000,

@@ -7,8 +7,9 @@ use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings,
 };
 use photoncard_driver::scene::{
-    Material, Projection, PunctualKind, PunctualLight, Reflection, Scene, Transmission,
+    LightAxes, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene, Transmission,
 };
+use photoncard_firmware::light_groups::LightGroups;
 use photoncard_firmware::memory::Counted;
 use photoncard_firmware::photon::{CausticSearch, Caustics, LitBy, MIN_NORMAL_COSINE, reflected_caustics};
 use photoncard_firmware::scene::{PartialReflection, Surface};
@@ -42,7 +43,12 @@ fn two_balls() -> Scene {
     add_ball(&mut scene, Vec3::new(-0.5, -0.6, 0.0), 0.3, 24, 1);
     add_ball(&mut scene, Vec3::new(0.55, -0.75, 0.1), 0.15, 24, 2);
     let kind = PunctualKind::Point { position: Vec3::new(0.0, 0.6, 0.0) };
-    scene.lights.push(PunctualLight { name: "light".into(), kind, intensity: Vec3::ONE });
+    scene.lights.push(PunctualLight {
+        name: "light".into(),
+        kind,
+        intensity: Vec3::ONE,
+        axes: LightAxes::default(),
+    });
     scene
 }
 
@@ -88,7 +94,12 @@ fn mirror_behind_a_board(has_board: bool) -> Scene {
     view.projection = Projection::perspective(0.6);
     let mut scene = scene(triangles, materials, view);
     let kind = PunctualKind::Point { position: Vec3::new(-0.93, 0.96, 0.2) };
-    scene.lights.push(PunctualLight { name: "lamp".into(), kind, intensity: Vec3::ONE });
+    scene.lights.push(PunctualLight {
+        name: "lamp".into(),
+        kind,
+        intensity: Vec3::ONE,
+        axes: LightAxes::default(),
+    });
     scene
 }
 
@@ -133,6 +144,7 @@ fn searched(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) ->
         lobe,
         lit_by: LitBy::All,
         normals: [normal; 2],
+        groups: LightGroups::ONE,
     });
     let of_map = [Structure::CausticNodes, Structure::CausticPhotons];
     let reads = memory.traffic().sum(|_, structure| of_map.contains(&structure));

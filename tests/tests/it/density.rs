@@ -5,6 +5,7 @@ use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Encoding, Image, Material, Scene, Texture, Triangle};
+use photoncard_firmware::light_groups::LightGroups;
 use photoncard_firmware::photon::{
     CandidateBuffer, Estimate, GatherLimits, NearestPhotons, PhotonMap, Reflected, Sight, gather,
     gathered_radiance,
@@ -73,12 +74,17 @@ impl Map {
         let radius = nearest.radius();
         let (nearest, reflection) = (&nearest, &reflection);
         let cell = scene.header.photon_grid.cell;
-        let estimate = || Estimate { nearest, cell, region: None, reflection, lobe };
+        let estimate =
+            || Estimate { nearest, cell, region: None, reflection, lobe, groups: LightGroups::ONE };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let of_disc = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == of_disc), "{position}");
-        let limits =
-            GatherLimits { neighbors: NEIGHBORS, max_distance: self.max_distance, free_within: length };
+        let limits = GatherLimits {
+            neighbors: NEIGHBORS,
+            max_distance: self.max_distance,
+            free_within: length,
+            groups: LightGroups::ONE,
+        };
         let mut searches = 0;
         let mut count = |_: u32, _: &NearestPhotons, _: &Reflected| searches += 1;
         let radiance =
@@ -86,7 +92,7 @@ impl Map {
                 .unwrap();
         let is_simple = of_disc.sight == Sight::Free && length > radius;
         assert!(if is_simple { radiance == of_disc.radiance } else { searches > 0 });
-        f64::from(radiance.x)
+        f64::from(radiance.total(LightGroups::ONE).x)
     }
 
     /// Mean radiance of a horizontal surface at height `y` along four segments of length `2 half`, each at

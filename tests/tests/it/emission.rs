@@ -6,8 +6,8 @@ use glam::{Vec2, Vec3};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::{trace, trace_caustics};
 use photoncard_driver::scene::{
-    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture,
-    Triangle, VertexAttributes,
+    Encoding, Environment, Image, LightAxes, Material, PunctualKind, PunctualLight, Reflection, Scene,
+    Texture, Triangle, VertexAttributes,
 };
 use photoncard_firmware::scene::light::{environment_direction, environment_radiance};
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -48,7 +48,7 @@ fn outside() -> Scene {
 }
 
 fn light(kind: PunctualKind, intensity: [f32; 3]) -> PunctualLight {
-    PunctualLight { name: "light".into(), kind, intensity: intensity.into() }
+    PunctualLight { name: "light".into(), kind, intensity: intensity.into(), axes: LightAxes::default() }
 }
 
 const COLOUR: [f32; 3] = [3.0, 2.0, 0.5];
@@ -90,10 +90,15 @@ fn a_directional_light_gives_its_irradiance_to_surfaces_that_face_it() {
     for direction in [Vec3::NEG_Y, Vec3::new(1.0, -2.0, 0.5)] {
         let direction = direction.normalize();
         let mut cube = outside();
-        cube.lights = vec![light(PunctualKind::Directional { direction }, COLOUR)];
+        cube.lights = vec![light(PunctualKind::Directional { direction, angle: 0.0 }, COLOUR)];
         let shown = 4.0 * f64::from(direction.abs().element_sum());
         check(&cube, times(COLOUR, shown), "directional");
     }
+    // A hemisphere of radiance E / pi gives E to the top and half of it to each of the four sides.
+    let kind = PunctualKind::Directional { direction: Vec3::NEG_Y, angle: PI as f32 };
+    let mut cube = outside();
+    cube.lights = vec![light(kind, COLOUR)];
+    check(&cube, times(COLOUR, 4.0 + 4.0 * 2.0), "a hemisphere");
 }
 
 #[test]
@@ -212,7 +217,7 @@ fn photons_are_aimed_at_surfaces_far_from_the_lights() {
     let in_spot = |way: Vec3| if way.x > 0.0 { 1.0 } else { 0.0 };
     check(&cubes, times(COLOUR, received_from(position, in_spot)), "spot");
     let direction = Vec3::new(0.3, -1.0, 0.2).normalize();
-    cubes.lights = vec![light(PunctualKind::Directional { direction }, COLOUR)];
+    cubes.lights = vec![light(PunctualKind::Directional { direction, angle: 0.0 }, COLOUR)];
     let shown = f64::from(direction.abs().element_sum() * 8.0 * HALF * HALF);
     check(&cubes, times(COLOUR, shown), "directional");
     cubes.lights.clear();
@@ -269,7 +274,10 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
     let mut triangles = [square(0.0, 10.0, 1), square(3.0, 1.0, 0)].concat();
     // The plate faces the mirror, downwards.
     triangles[2..].iter_mut().for_each(|triangle| triangle.vertices.reverse());
-    let sun = light(PunctualKind::Directional { direction: Vec3::new(1.0, -1.0, 0.0).normalize() }, COLOUR);
+    let sun = light(
+        PunctualKind::Directional { direction: Vec3::new(1.0, -1.0, 0.0).normalize(), angle: 0.0 },
+        COLOUR,
+    );
     let spot = PunctualKind::Spot {
         position: 2.0 * Vec3::Y,
         direction: Vec3::Y,

@@ -130,16 +130,39 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
                 s.integrator.samples = samples;
                 s.picture.layers = settings_of.picture.layers.clone();
                 s.picture.transparent = settings_of.picture.transparent;
+                s.picture.light_groups = settings_of.picture.light_groups.clone();
+                if !s.picture.light_groups.is_empty() {
+                    // A chip has room for fewer pixels with sums for each group.
+                    s.schedule.tile = s.schedule.tile.map(|side| side.min(9));
+                }
             })
         };
         let expected = sums(&render_or_panic(scene, &with(settings())).film);
         // For a single sample per pixel, only three variants are rendered, with two kinds of chips.
         for variant in variants().into_iter().step_by(if samples == 1 { 8 } else { 1 }) {
             let variant = with(variant);
+            if !scene.light_groups.names().is_empty() && !has_light_groups(&variant) {
+                continue;
+            }
             let film = render_or_panic(scene, &variant).film;
             assert!(sums(&film) == expected, "{variant:?} changes the picture");
         }
     }
+}
+
+/// Returns whether the photons of the settings have light groups, and their chips irradiance records for
+/// each.
+fn has_light_groups(settings: &RenderSettings) -> bool {
+    let is_nano = settings.cards.addresses == [card("emulated-nano:2")];
+    settings.photons.layout == PhotonLayout::Lines && !is_nano
+}
+
+/// Scene with every feature, whose lights are in the first `count` of three groups, none at 0.
+fn with_light_groups(count: usize) -> Scene {
+    let requests = ["rest=screen", "key=lamp", "sky=environment"].map(str::to_owned);
+    let mut scene = everything();
+    scene.set_light_groups(&requests[..count]).expect("there are these lights");
+    scene
 }
 
 /// Camera that sees the same place as `camera`, with another projection: by `number` from 1 on a shifted thin
@@ -212,8 +235,12 @@ proptest! {
         is_adaptive: bool,
         projection in 0_usize..4,
         transparent: bool,
+        groups in 0_usize..4,
     ) {
-        let scene = everything().with(|scene| scene.cameras[0] = projected(&scene.cameras[0], projection));
+        let scene = with_light_groups(groups);
+        let scene = scene.with(|scene| scene.cameras[0] = projected(&scene.cameras[0], projection));
+        // With layers and light groups, a chip has room for fewer pixels.
+        let widest = if has_layers && groups > 0 { 5 } else { 8 };
         let base = settings().with(|s| {
             (s.picture.width, s.picture.height) = (17, 13);
             s.photons.count = 1500;
@@ -225,13 +252,21 @@ proptest! {
             }
             s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
             s.picture.transparent = transparent;
-            s.schedule.tile = Some(8);
+            s.picture.light_groups = scene.light_groups.names().to_vec();
+            s.schedule.tile = Some(widest);
         });
         let expected = render_or_panic(&scene, &base).film;
         let changed = base.with(|s| {
             let has_room = cards.starts_with("emulated-large");
             let in_flight = in_flight.filter(|_| has_room);
-            s.schedule = Schedule { tile: Some(tile), order, bins: None, queue, in_flight, ..Schedule::default() };
+            s.schedule = Schedule {
+                tile: Some(tile.min(widest)),
+                order,
+                bins: None,
+                queue,
+                in_flight,
+                ..Schedule::default()
+            };
             s.cards.addresses = vec![card(cards)];
         });
         let film = render_or_panic(&scene, &changed).film;
@@ -274,6 +309,17 @@ fn textures_cut_outs_mirrors_glass_and_lights_of_every_kind_are_exact() {
         s.picture.transparent = true;
     });
     check_variants_of(&everything(), &small);
+}
+
+#[test]
+fn light_groups_are_exact() {
+    let scene = with_light_groups(3);
+    let small = few_pixels().with(|s| {
+        (s.picture.width, s.picture.height) = (21, 17);
+        s.photons.caustic_photons = Some(1000);
+        s.picture.light_groups = scene.light_groups.names().to_vec();
+    });
+    check_variants_of(&scene, &small);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use photoncard_driver::film::PixelLayers;
 use photoncard_driver::layer;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Coat, Encoding, Environment, Image, Layers, Material, Projection, PunctualKind, PunctualLight,
+    Coat, Encoding, Environment, Image, Layers, LightAxes, Material, Projection, PunctualKind, PunctualLight,
     Reflection, Scene, Texture, Triangle,
 };
 use photoncard_tests::shapes::{add_textured_quad, cuboid};
@@ -111,8 +111,13 @@ fn lights() -> Vec<Light> {
         (
             "sun",
             |scene| {
-                let kind = PunctualKind::Directional { direction: Vec3::new(0.8, -0.6, 0.0) };
-                scene.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(3.0) });
+                let kind = PunctualKind::Directional { direction: Vec3::new(0.8, -0.6, 0.0), angle: 0.0 };
+                scene.lights.push(PunctualLight {
+                    name: "sun".into(),
+                    kind,
+                    intensity: Vec3::splat(3.0),
+                    axes: LightAxes::default(),
+                });
             },
             Box::new(|through| 3.0 * 0.6 * through(0.6)),
         ),
@@ -120,7 +125,12 @@ fn lights() -> Vec<Light> {
             "point",
             |scene| {
                 let kind = PunctualKind::Point { position: Vec3::new(-1.2, 1.6, 0.0) };
-                scene.lights.push(PunctualLight { name: "bulb".into(), kind, intensity: Vec3::splat(3.0) });
+                scene.lights.push(PunctualLight {
+                    name: "bulb".into(),
+                    kind,
+                    intensity: Vec3::splat(3.0),
+                    axes: LightAxes::default(),
+                });
             },
             Box::new(|through| 3.0 / 4.0 * 0.8 * through(0.8)),
         ),
@@ -304,8 +314,13 @@ fn light_reflected_by_a_pane_is_a_caustic() {
         };
         let mut scene = floor(glass("wall", Vec3::ONE, thickness > 0.0), &wall);
         let half = std::f32::consts::FRAC_1_SQRT_2;
-        let kind = PunctualKind::Directional { direction: Vec3::new(half, -half, 0.0) };
-        scene.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(3.0) });
+        let kind = PunctualKind::Directional { direction: Vec3::new(half, -half, 0.0), angle: 0.0 };
+        scene.lights.push(PunctualLight {
+            name: "sun".into(),
+            kind,
+            intensity: Vec3::splat(3.0),
+            axes: LightAxes::default(),
+        });
         // In a wider field of view the caustic is gathered at many positions.
         scene.cameras[0].projection = Projection::perspective(0.6);
         let [direct, _, caustic] = irradiances(&scene, &settings());

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
+    Camera, Environment, LightAxes, Material, Projection, PunctualKind, PunctualLight, Reflection, Scene,
 };
 use photoncard_tests::{camera, mean, quad, radiances, render_or_panic, scene};
 
@@ -111,8 +111,9 @@ fn a_groove_of_glossy_metal_reflects_a_distant_light() {
         let direction = -Vec3::new(0.2, 1.0, 0.1).normalize();
         let sun = PunctualLight {
             name: "sun".to_owned(),
-            kind: PunctualKind::Directional { direction },
+            kind: PunctualKind::Directional { direction, angle: 0.0 },
             intensity: Vec3::ONE,
+            axes: LightAxes::default(),
         };
         let lit = groove(roughness, 2.0).with(|scene| scene.lights = vec![sun]);
         let many = settings().with(|s| s.photons.caustic_photons = Some(500_000));

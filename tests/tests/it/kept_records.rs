@@ -15,7 +15,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{Line, Structure};
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, PixelSums, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, PixelForm, PixelSums, Tile};
 use photoncard_tests::everything::everything;
 use photoncard_tests::with_room_for_a_card;
 
@@ -87,7 +87,7 @@ impl World {
         parts.sort_by_key(|(id, _)| *id);
         let sums = |(_, part): &(u32, RenderedTile)| {
             let pixels = part.views.iter().zip(&part.sums);
-            pixels.map(|(view, light)| view.sums(&[*light])).collect::<Vec<_>>()
+            pixels.map(|(view, light)| view.sums(PixelForm::PLAIN, &[*light])).collect::<Vec<_>>()
         };
         Ok((parts.iter().flat_map(sums).collect(), counters))
     }

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, Material, Projection,
+    Camera, Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, LightAxes, Material, Projection,
     PunctualKind, PunctualLight, Reflection, Scene, Sheen, Texture, Transmission,
 };
 use photoncard_tests::shapes::{add_ball, add_textured_quad};
@@ -237,8 +237,9 @@ fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
         let triangles = [square(1.0, 0.0, 0), square(1.2, 0.5, 1)].concat();
         let sun = PunctualLight {
             name: "sun".to_owned(),
-            kind: PunctualKind::Directional { direction: Vec3::NEG_Y },
+            kind: PunctualKind::Directional { direction: Vec3::NEG_Y, angle: 0.0 },
             intensity: Vec3::ONE,
+            axes: LightAxes::default(),
         };
         let lit =
             scene(triangles, vec![floor, glass(0.0, false)], view).with(|scene| scene.lights = vec![sun]);

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::scene::{Environment, Material, PunctualKind, PunctualLight, Scene, Triangle};
+use photoncard_driver::scene::{
+    Environment, LightAxes, Material, PunctualKind, PunctualLight, Scene, Triangle,
+};
 use photoncard_firmware::memory::{Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::SceneImage;
@@ -51,6 +53,7 @@ fn hall(triangles: u32) -> Scene {
             }
         },
         intensity: Vec3::splat(0.01),
+        axes: LightAxes::default(),
     };
     let mut hall = scene(
         (0..triangles).map(triangle).collect(),

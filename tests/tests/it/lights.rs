@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::{Vec2, Vec3};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Encoding, Environment, Image, Material, Projection, PunctualKind, PunctualLight, Scene, Texture,
-    Triangle, VertexAttributes,
+    Camera, Encoding, Environment, Image, LightAxes, Material, Projection, PunctualKind, PunctualLight,
+    Scene, Texture, Triangle, VertexAttributes,
 };
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
@@ -29,7 +29,12 @@ fn bare_floor(place: Vec3) -> Scene {
 }
 
 fn lit_by(kind: PunctualKind, intensity: f32, place: Vec3) -> Scene {
-    let light = PunctualLight { name: "light".into(), kind, intensity: Vec3::splat(intensity) };
+    let light = PunctualLight {
+        name: "light".into(),
+        kind,
+        intensity: Vec3::splat(intensity),
+        axes: LightAxes::default(),
+    };
     bare_floor(place).with(|scene| scene.lights = vec![light])
 }
 
@@ -99,11 +104,49 @@ fn a_spot_falls_off_between_its_cones() {
 fn a_directional_light_lights_by_the_cosine_at_every_point() {
     for direction in [Vec3::NEG_Y, Vec3::new(1.0, -1.0, 0.5), Vec3::new(-3.0, -0.5, 0.0)] {
         let direction = direction.normalize();
-        let kind = PunctualKind::Directional { direction };
+        let kind = PunctualKind::Directional { direction, angle: 0.0 };
         let expected = reflected(4.0 * f64::from(-direction.y));
         for x in [0.0, 5.0] {
             check(&lit_by(kind, 4.0, Vec3::new(x, 0.0, 0.0)), &settings(1, 0), expected, 1e-4);
         }
+    }
+}
+
+#[test]
+fn a_disk_of_any_angle_gives_the_irradiance_of_a_directional_light() {
+    for (direction, degrees) in
+        [(Vec3::NEG_Y, 180.0_f32), (Vec3::NEG_Y, 90.0), (Vec3::new(1.0, -1.0, 0.5), 60.0)]
+    {
+        let direction = direction.normalize();
+        let kind = PunctualKind::Directional { direction, angle: degrees.to_radians() };
+        let expected = reflected(4.0 * f64::from(-direction.y));
+        check(&lit_by(kind, 4.0, Vec3::ZERO), &settings(64, 0), expected, 0.005);
+    }
+}
+
+/// A vertical light of a disk 10 degrees across is hidden by a board 1 m above the floor, whose edge is at x
+/// = 0. At the distance x from the edge's shadow, the disk's visible part is a segment of a circle.
+#[test]
+fn the_penumbra_of_a_disk_is_as_wide_as_its_angle() {
+    let angle = 10.0_f32.to_radians();
+    let kind = PunctualKind::Directional { direction: Vec3::NEG_Y, angle };
+    let reach = f64::from(angle / 2.0).tan();
+    let at = |x: f32, z: f32| Vec3::new(x, 1.0, z);
+    let board = quad([at(0.0, 4.0), at(4.0, 4.0), at(4.0, -4.0), at(0.0, -4.0)], 1);
+    for share in [-1.1, -0.8, -0.4, 0.0, 0.4, 0.8, 1.1] {
+        // The camera stands beside the board.
+        let place = Vec3::new((share * reach) as f32, 0.0, 0.0);
+        let origin = place + Vec3::new(-1.0, 0.5, 0.0);
+        let view = Camera { projection: Projection::perspective(0.002), ..camera(origin, place - origin) };
+        let scene = lit_by(kind, 4.0, place).with(|scene| {
+            scene.triangles.extend(board);
+            scene.materials.push(Material { double_sided: true, ..lambertian("board", 0.0) });
+            scene.cameras = vec![view];
+        });
+        let edge = share.clamp(-1.0, 1.0);
+        let visible = (edge.acos() - edge * (1.0 - edge * edge).sqrt()) / PI;
+        let found = seen(&scene, &settings(64, 0)) / reflected(4.0);
+        assert!((found - visible).abs() < 0.01, "{share}: {found} instead of {visible}");
     }
 }
 

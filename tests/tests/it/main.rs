@@ -1,6 +1,7 @@
 //! Tests of several crates together.
 
 mod adaptive;
+mod bake;
 mod blender;
 mod boards;
 mod caches;
@@ -21,9 +22,11 @@ mod furnace;
 mod glossy;
 mod imports;
 mod instances;
+mod irradiance;
 mod irradiance_cache;
 mod kept_records;
 mod layers;
+mod light_groups;
 mod light_tree;
 mod lights;
 mod long_paths;
@@ -38,6 +41,7 @@ mod penumbra;
 mod photons_for;
 mod png_chunks;
 mod precomputed;
+mod profiles;
 mod qemu;
 mod quality;
 mod rays;

@@ -20,7 +20,7 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
         position,
         power: Rgbe::encode([1.0; 3], u32::from(index)),
         direction: (index / 3).to_le_bytes(),
-        axis: 0,
+        axis_or_group: 0,
         normal: 0,
         disc: FULL_DISC,
         direct: false,
@@ -68,7 +68,7 @@ fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -
             let record = scene.record::<20, 6>(&mut memory, SectionKind::Photons, index).unwrap();
             let [x, y, z] = Photon::position(record);
             let [x, y, z] = [query.x - x, query.y - y, query.z - z];
-            Candidate::new(x * x + y * y + z * z, Photon::content(record))
+            Candidate::new(x * x + y * y + z * z, Photon::content_without_axis(record))
         })
         .filter(|candidate| candidate.distance_squared() <= max_distance * max_distance)
         .collect();

@@ -31,7 +31,7 @@ fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 
         position,
         power: Rgbe::encode([1.0, 0.5, 0.25], 0),
         direction: [0; 2],
-        axis: 0,
+        axis_or_group: 0,
         normal,
         disc: FULL_DISC,
         direct: false,

@@ -7,7 +7,7 @@ use photoncard_driver::quality::{Finish, Fit, Quality, Stated};
 use photoncard_driver::render::{RenderSettings, Unobserved};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scene::{
-    Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, Triangle,
+    Environment, LightAxes, Material, PunctualKind, PunctualLight, Reflection, Scene, Triangle,
 };
 use photoncard_tests::{camera, lambertian, mean, quad, render_or_panic, room, scene};
 
@@ -43,7 +43,12 @@ fn room_with_a_point() -> Scene {
     let mut scene =
         scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::new(0.0, 0.0, 0.9), Vec3::NEG_Z));
     let kind = PunctualKind::Point { position: Vec3::ZERO };
-    scene.lights.push(PunctualLight { name: "light".into(), kind, intensity: Vec3::ONE });
+    scene.lights.push(PunctualLight {
+        name: "light".into(),
+        kind,
+        intensity: Vec3::ONE,
+        axes: LightAxes::default(),
+    });
     scene
 }
 
@@ -175,8 +180,13 @@ fn soft_caustics_have_no_map_and_equal_light() {
 #[test]
 fn caustics_of_suns_and_of_small_bright_lamps_have_a_map() {
     let mut sunny = floor_before_a_mirror(&[], lambertian("none", 0.5));
-    let kind = PunctualKind::Directional { direction: Vec3::new(0.0, -1.0, -1.0).normalize() };
-    sunny.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(0.1) });
+    let kind = PunctualKind::Directional { direction: Vec3::new(0.0, -1.0, -1.0).normalize(), angle: 0.0 };
+    sunny.lights.push(PunctualLight {
+        name: "sun".into(),
+        kind,
+        intensity: Vec3::splat(0.1),
+        axes: LightAxes::default(),
+    });
     let lamp = Material { emission: Vec3::splat(500.0), ..lambertian("lamp", 0.0) };
     let corners = [[0.0, 0.0], [0.01, 0.0], [0.01, 0.01], [0.0, 0.01]].map(|[x, z]| Vec3::new(x, 2.0, z));
     let lit = floor_before_a_mirror(&quad(corners, 2), lamp);
@@ -191,8 +201,13 @@ fn a_scene_that_stores_no_photon_has_settings() {
     let floor = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
     let view = camera(Vec3::new(0.0, 1.0, 1.0), Vec3::new(0.0, -0.8, -1.0));
     let mut scene = scene(quad(floor, 0).to_vec(), vec![lambertian("floor", 0.5)], view);
-    let kind = PunctualKind::Directional { direction: Vec3::Y };
-    scene.lights.push(PunctualLight { name: "light".into(), kind, intensity: Vec3::ONE });
+    let kind = PunctualKind::Directional { direction: Vec3::Y, angle: 0.0 };
+    scene.lights.push(PunctualLight {
+        name: "light".into(),
+        kind,
+        intensity: Vec3::ONE,
+        axes: LightAxes::default(),
+    });
     let found = fit(&scene, &small());
     assert!(found.photons > 0, "{found:?}");
     let settings = small().with(|settings| found.apply(settings, Stated::default()));

@@ -84,8 +84,11 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             aperture: Pixels = Some(Aperture::Diameter(0.3)),
             focus: Pixels = Some(0.7),
             layers: Pixels = Layers::all(),
+            light_groups: Pixels = vec!["rest".to_owned()],
             filter: Pixels = Filter::Gaussian,
             transparent: Pixels = true,
+            irradiance: Pixels = true,
+            lumens_per_watt: Nothing = Some(683.0),
         }
         photons: PhotonMaps {
             count: Image = 2001,
@@ -160,6 +163,15 @@ fn with_two_cameras() -> Scene {
     scene
 }
 
+/// The scene with the light groups of the settings, the first of which has the sky.
+fn with_groups(scene: &Scene, settings: &RenderSettings) -> Scene {
+    let mut scene = scene.clone();
+    let requests: Vec<_> =
+        settings.picture.light_groups.iter().map(|name| format!("{name}=environment")).collect();
+    scene.set_light_groups(&requests).expect("there is a sky");
+    scene
+}
+
 /// Size, window, and `f32::to_bits` of all pixels and layers of a film.
 fn bits(film: &Film) -> Vec<u32> {
     let window = film.window();
@@ -172,6 +184,7 @@ fn bits(film: &Film) -> Vec<u32> {
             .into_iter()
             .chain(layers)
             .chain([film.position])
+            .chain(film.light_groups)
             .flatten()
             .chain(single)
             .map(f32::to_bits)
@@ -193,14 +206,15 @@ fn a_setting_is_in_the_identity_of_a_picture_exactly_if_pixels_depend_on_it() {
     for (name, dependence, changed) in changes(folder.path()) {
         assert!(changed != settings(), "{name} is not changed");
         let is_of_pixels = matches!(dependence, Dependence::Image | Dependence::Pixels);
-        let found = bits(&render_or_panic(&scene, &changed).film);
+        let found = bits(&render_or_panic(&with_groups(&scene, &changed), &changed).film);
         assert_eq!(found != expected, is_of_pixels, "the pixels by {name}");
         assert_eq!(changed.of_pixels() != settings().of_pixels(), is_of_pixels, "{name}");
         assert_eq!(changed.identity(&scene) != settings().identity(&scene), is_of_pixels, "{name}");
         differing += usize::from(is_of_pixels);
     }
-    // Width and height are two fields, and one option. Transparency is stated only where it is on.
-    assert_eq!(settings().of_pixels().len(), differing - 2);
+    // Width and height are two fields, and one option. Transparency, irradiance and light groups are stated
+    // only where there are any.
+    assert_eq!(settings().of_pixels().len(), differing - 4);
 }
 
 #[test]

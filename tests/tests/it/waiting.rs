@@ -18,7 +18,7 @@ use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line, Structure};
-use photoncard_shared::budget::{Budget, sums_of_pixel};
+use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Command, Drain, FaultCode, FrameParameters, Radiance, Tile};
 use photoncard_tests::everything::everything;
@@ -50,13 +50,21 @@ struct Traffic {
 
 impl World {
     fn new(change: impl FnOnce(&mut RenderSettings)) -> Self {
-        let scene = everything();
+        Self::with_light_groups(&[], change)
+    }
+
+    /// World with these light groups.
+    fn with_light_groups(groups: &[&str], change: impl FnOnce(&mut RenderSettings)) -> Self {
+        let mut scene = everything();
+        let groups: Vec<String> = groups.iter().map(|&group| group.to_owned()).collect();
+        scene.set_light_groups(&groups).expect("there are these lights");
         let settings = RenderSettings::default().with(|s| {
             (s.picture.width, s.picture.height) = (18, 14);
             (s.photons.count, s.photons.neighbors) = (2000, 20);
             (s.photons.caustic_photons, s.photons.caustic_neighbors) = (Some(500), 20);
             (s.integrator.gather_rays, s.integrator.shadow_rays) = (8, 1);
             (s.integrator.samples, s.integrator.irradiance_error) = (1, None);
+            s.picture.light_groups = scene.light_groups.names().to_vec();
             change(s);
         });
         let pack = if settings.picture.layers == Layers::all() {
@@ -132,7 +140,7 @@ impl World {
 
 /// Sums of all pixels, row by row, from those of tiles.
 fn tiles_of_film(tiles: &[Tile], parts: &[(u32, RenderedTile)], frame: &FrameParameters) -> Vec<[i64; 3]> {
-    let count = sums_of_pixel(frame.layers) as usize;
+    let count = frame.form().sums_of_light() as usize;
     let mut pixels = BTreeMap::new();
     for (id, part) in parts {
         let tile = tiles.iter().find(|tile| tile.id == *id).expect("a tile");
@@ -160,12 +168,13 @@ proptest! {
         waiting_blocks in 1..9_u32,
         gather_queue in prop_oneof![8..60_u32, 60..3000_u32],
         limit in prop_oneof![Just(u32::MAX), 1..40_u32],
-        side in 3..9_u32,
+        side in 3..6_u32,
         irradiance_error in prop::sample::select(&[None, Some(0.1), Some(1e-4)][..]),
         has_layers: bool,
         is_adaptive: bool,
+        groups in 0..3_usize,
     ) {
-        let world = World::new(|s| {
+        let world = World::with_light_groups(&["key=lamp", "sky=environment"][..groups], |s| {
             s.integrator.irradiance_error = irradiance_error;
             s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
             if is_adaptive {
@@ -173,7 +182,7 @@ proptest! {
             }
         });
         let micro = EmulatedKind::Micro.emulated();
-        let expected = world.render(&mut micro.chip(), &world.frame, (8, 0));
+        let expected = world.render(&mut micro.chip(), &world.frame, (5, 0));
         let budget = Budget { waiting_blocks, gather_queue, ..*micro.budget() };
         let frame = FrameParameters { drain: Drain::Buckets, queue: limit, ..world.frame };
         let found = world.render(&mut micro.with_budget(budget).chip(), &frame, (side, room));

@@ -40,9 +40,12 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// Returns whether two answers have equal pixels and, if both are of cards, equal counters.
+    /// Returns whether two answers have equal pixels and, if both are of cards that did all of the work,
+    /// equal counters. A card that reads irradiance records back, which it has kept, works less than another.
     fn agrees_with(&self, other: &Self) -> bool {
-        let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
+        let is_kept = [self, other]
+            .iter()
+            .any(|answer| answer.source == Source::Kept || answer.tile.counters.kept_records > 0);
         let work = |answer: &Self| {
             // These counters depend on the chip: the capacity of its queue, and its processor.
             Counters { drains: 0, most_waiting: 0, cycles: 0, ..answer.tile.counters }

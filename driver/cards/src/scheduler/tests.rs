@@ -239,6 +239,8 @@ fn counters_must_agree_except_those_of_the_gather_queue() {
     for (counters, agrees) in [
         (Counters { eye_rays: 10, drains: 7, most_waiting: 9, ..Counters::ZERO }, true),
         (Counters { eye_rays: 11, ..Counters::ZERO }, false),
+        // A card that reads records back works less.
+        (Counters { kept_records: 3, ..Counters::default() }, true),
     ] {
         let mut scheduler = scheduler(1, 2).verifying(1.0, 0);
         let mut other = finished(0, 0);

@@ -16,7 +16,7 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 ///
 /// | sum | range |
 /// |---|---|
-/// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
+/// | light, of layers and groups too | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s (1 + 2^-19) |
 /// | depths | 0 to s times the distance from the eye to the farthest corner of `[-reach, reach]^3` |
@@ -77,8 +77,18 @@ impl PixelLimits {
     /// Returns the first invalid value of a pixel; `None` if all are valid.
     pub(super) fn find_bad(&self, sums: &PixelSums) -> Option<BadValue> {
         let depths = self.depths?;
-        let PixelSums { light, albedo, normal, depth, surfaces, layers, position, coverage, identities } =
-            *sums;
+        let PixelSums {
+            light,
+            albedo,
+            normal,
+            depth,
+            surfaces,
+            layers,
+            light_groups,
+            position,
+            coverage,
+            identities,
+        } = *sums;
         let seen = f64::from(surfaces);
         let find = |channel, values: [f64; 3], is_possible: &dyn Fn(f64) -> bool| {
             let bad = values.into_iter().find(|&value| !is_possible(value));
@@ -115,6 +125,10 @@ impl PixelLimits {
                 let is_possible = coverage.is_none_or(|covered| total <= covered);
                 let bad = BadValue { channel: "coverage of identities", value: f64::from(total) };
                 (!is_possible).then_some(bad)
+            })
+            .or_else(|| {
+                let groups = light_groups?;
+                groups.sums().iter().find_map(|group| find_light("light of a light group", *group))
             })
             .or_else(|| {
                 let LayerSums { direct, indirect, caustic, gathers } = layers?;

@@ -66,7 +66,7 @@ impl TilesInFlight {
         }
         for (index, pixel) in (first..).zip(pixels) {
             let wrong_order = SessionError::Unexpected("pixels whose identities are not in order");
-            let sums = PixelSums::read(pixel).ok_or(wrong_order)?;
+            let sums = PixelSums::read(limits.format().form, pixel).ok_or(wrong_order)?;
             if let Some(BadValue { channel, value }) = limits.find_bad(&sums) {
                 let (x, y) = (tile.x + index % tile.width, tile.y + index / tile.width);
                 return Err(SessionError::Value { tile, x, y, channel, value });
@@ -153,6 +153,7 @@ mod tests {
             radiance: Radiance::Density,
             caustics: None,
             layers: false,
+            light_groups: 0,
             filter: Filter::Box,
             in_flight: 2,
             keep_records: false,
@@ -161,6 +162,7 @@ mod tests {
             position: false,
             coverage: false,
             identities: false,
+            irradiance: false,
         }
     }
 

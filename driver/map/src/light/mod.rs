@@ -7,6 +7,7 @@ mod emission;
 pub(crate) mod environment;
 mod environment_parts;
 mod footprint;
+mod profile;
 mod pyramid;
 mod shares;
 mod sources;
@@ -14,7 +15,9 @@ mod targets;
 mod thresholds;
 mod tree;
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use photoncard_shared::address::LINE_BYTES;
@@ -25,6 +28,7 @@ use rayon::prelude::*;
 use self::colour::mean;
 use self::emission::EmissiveTextures;
 pub(crate) use self::environment::EnvironmentMap;
+pub(crate) use self::profile::{ProfileDirection, ProfileDirections};
 use self::shares::Shares;
 pub use self::sources::SourceRadiance;
 pub(crate) use self::sources::{Source, Sources};
@@ -40,13 +44,19 @@ pub(crate) struct Lights {
     /// Index of the emitter of each triangle of the scene; empty if no triangle emits.
     of_triangles: Vec<Option<u32>>,
     tree: LightTree,
+    profiles: Arc<Profiles>,
     distant: Vec<DistantLight>,
     environment: Option<EnvironmentMap>,
     shares: Shares,
     power: f64,
+    /// Light group of the environment.
+    environment_group: u8,
 }
 
-/// Leaf of the light tree: an emissive triangle, a point light or a spot light.
+/// Directions of the lights with profiles, by the index of a profile's texture.
+pub(crate) type Profiles = BTreeMap<u32, ProfileDirections>;
+
+/// Leaf of the light tree: an emissive triangle, or a light at a point.
 #[derive(Debug)]
 struct SceneEmitter {
     /// Index of the triangle in the scene; `usize::MAX` for a light without an area.
@@ -68,13 +78,17 @@ impl Lights {
         for (index, emitter) in (0..).zip(&emitters) {
             of_triangles[emitter.triangle] = Some(index);
         }
-        emitters.extend(scene.lights.iter().filter_map(SceneEmitter::of_light));
+        let profiles = profiles(scene);
+        let lights = scene.lights.iter().enumerate();
+        emitters.extend(lights.filter_map(|(index, light)| {
+            SceneEmitter::of_light(light, scene.light_groups.of_light(index), &profiles)
+        }));
         let bounds: Vec<Bounds> = emitters.iter().map(|emitter| emitter.bounds.clone()).collect();
         let tree = LightTree::new(&bounds);
         for (emitter, &trail) in emitters.iter_mut().zip(&tree.trails) {
             emitter.record.trail = trail;
         }
-        let distant = distant_lights(&scene.lights);
+        let distant = distant_lights(scene);
         let environment = scene.environment.as_ref().and_then(EnvironmentMap::new);
         let tree_power = emitters.iter().map(|emitter| emitter.bounds.power).sum();
         let [emitter_power, environment_power, distant_power] =
@@ -83,10 +97,12 @@ impl Lights {
             emitters,
             of_triangles,
             tree,
+            profiles: Arc::new(profiles),
             shares: Shares::new([emitter_power, environment_power, distant_power]),
             power: emitter_power + environment_power + distant_power,
             distant,
             environment,
+            environment_group: scene.light_groups.of_environment(),
         }
     }
 
@@ -142,6 +158,7 @@ impl Lights {
             texture: environment.map(|_| texture),
             // The grid has at most 128 columns and 64 rows.
             cells: cells.map(|cells| cells as u16),
+            light_group: self.environment_group,
         }
     }
 
@@ -156,7 +173,10 @@ fn area_emitters(scene: &Scene) -> Vec<SceneEmitter> {
     let textures = EmissiveTextures::new(scene);
     let emitter = |(index, triangle): (usize, &Triangle)| {
         let material = &scene.materials[triangle.material as usize];
-        material.is_emissive().then(|| SceneEmitter::of_triangle(index, triangle, material, &textures))?
+        let group = scene.light_groups.of_material(triangle.material as usize);
+        material
+            .is_emissive()
+            .then(|| SceneEmitter::of_triangle(index, triangle, (material, group), &textures))?
     };
     scene.triangles.par_iter().enumerate().filter_map(emitter).collect()
 }
@@ -165,7 +185,7 @@ impl SceneEmitter {
     fn of_triangle(
         index: usize,
         triangle: &Triangle,
-        material: &Material,
+        (material, light_group): (&Material, u8),
         textures: &EmissiveTextures,
     ) -> Option<Self> {
         let area = f64::from(triangle.area());
@@ -184,6 +204,7 @@ impl SceneEmitter {
             },
             emission: material.emission.to_array(),
             trail: 0,
+            light_group,
         };
         let normal = triangle.scaled_normal().as_dvec3().normalize_or(DVec3::Y);
         let bounds = Bounds {
@@ -199,11 +220,14 @@ impl SceneEmitter {
     fn radiance(&self) -> f64 {
         match self.record.kind {
             EmitterKind::Triangle { .. } => mean(Vec3::from(self.record.emission)),
-            EmitterKind::Point { .. } | EmitterKind::Spot { .. } => f64::INFINITY,
+            EmitterKind::Point { .. } | EmitterKind::Spot { .. } | EmitterKind::Profile { .. } => {
+                f64::INFINITY
+            }
         }
     }
 
-    fn of_light(light: &PunctualLight) -> Option<Self> {
+    fn of_light(light: &PunctualLight, light_group: u8, profiles: &Profiles) -> Option<Self> {
+        let mut greatest = None;
         let (position, kind, cone, solid_angle) = match light.kind {
             PunctualKind::Point { position } => {
                 (position, EmitterKind::Point { position: position.to_array() }, Cone::ALL, 4.0 * PI)
@@ -219,15 +243,45 @@ impl SceneEmitter {
                 let angle = libm::acos(f64::from(outer_cosine).clamp(-1.0, 1.0));
                 (position, kind, Cone::new(direction.as_dvec3(), angle), spot.solid_angle())
             }
+            PunctualKind::Profile { position, texture } => {
+                let directions = profiles.get(&texture)?;
+                greatest = Some(directions.strongest);
+                let [aim, across] = [light.axes.aim, light.axes.across].map(|axis| axis.to_array());
+                let kind = EmitterKind::Profile { position: position.to_array(), aim, across, texture };
+                (position, kind, lit_cone(light.axes.aim.as_dvec3(), directions), directions.flux)
+            }
             PunctualKind::Directional { .. } => return None,
         };
         let intensity = light.intensity.as_dvec3();
         let power = intensity.element_sum() / 3.0 * solid_angle;
-        let record = Emitter { kind, emission: light.intensity.to_array(), trail: 0 };
+        let record = Emitter { kind, emission: light.intensity.to_array(), trail: 0, light_group };
         let bounds = Bounds { corners: vec![position.as_dvec3()], cone, power };
-        let strongest = intensity.max_element() * solid_angle;
+        let strongest = intensity.max_element() * greatest.unwrap_or(solid_angle);
         (power > 0.0).then_some(Self { triangle: usize::MAX, record, bounds, strongest })
     }
+}
+
+/// Directions of the profiles of a scene's lights.
+fn profiles(scene: &Scene) -> Profiles {
+    let textures = scene.lights.iter().filter_map(|light| match light.kind {
+        PunctualKind::Profile { texture, .. } => Some(texture),
+        _ => None,
+    });
+    let mut profiles = Profiles::new();
+    for index in textures {
+        let texture = scene.textures.get(index as usize);
+        let image = texture.and_then(|texture| scene.images.get(texture.image as usize));
+        if let Some(image) = image.filter(|image| image.height > 1 && !profiles.contains_key(&index)) {
+            profiles.insert(index, ProfileDirections::new(image));
+        }
+    }
+    profiles
+}
+
+/// Cone of the directions in which a profile has light: about the aim, or opposite to it.
+fn lit_cone(aim: DVec3, directions: &ProfileDirections) -> Cone {
+    let [greatest, least] = directions.lit;
+    if greatest <= PI - least { Cone::new(aim, greatest) } else { Cone::new(-aim, PI - least) }
 }
 
 /// Angular falloff of a spot light's intensity: `clamp(cos * scale + offset, 0, 1)^2`.
@@ -255,21 +309,29 @@ impl Spot {
     }
 }
 
-fn distant_lights(lights: &[PunctualLight]) -> Vec<DistantLight> {
-    let lit = lights.iter().filter_map(|light| match light.kind {
-        PunctualKind::Directional { direction } if light.intensity.max_element() > 0.0 => {
-            Some((direction, light.intensity))
+fn distant_lights(scene: &Scene) -> Vec<DistantLight> {
+    let lit = scene.lights.iter().enumerate().filter_map(|(index, light)| match light.kind {
+        PunctualKind::Directional { direction, angle } if light.intensity.max_element() > 0.0 => {
+            let spread = DistantLight::rounded_spread(spread(angle));
+            // A disk of radiance L has the solid angle `2 pi spread`, and gives a surface perpendicular to
+            // its axis the irradiance `L pi spread (2 - spread)`.
+            let irradiance = (light.intensity * (2.0 / (2.0 - spread))).to_array();
+            let light_group = scene.light_groups.of_light(index);
+            let direction = direction.to_array();
+            Some(DistantLight { direction, irradiance, threshold: 0, light_group, spread })
         }
         _ => None,
     });
-    let lit: Vec<(Vec3, Vec3)> = lit.collect();
-    let weights: Vec<f64> = lit.iter().map(|(_, irradiance)| mean(*irradiance)).collect();
-    let records = lit.into_iter().zip(thresholds(&weights));
-    records
-        .map(|((direction, irradiance), threshold)| DistantLight {
-            direction: direction.to_array(),
-            irradiance: irradiance.to_array(),
-            threshold,
-        })
-        .collect()
+    let mut lit: Vec<DistantLight> = lit.collect();
+    let weights: Vec<f64> = lit.iter().map(|light| mean(light.irradiance.into())).collect();
+    for (light, threshold) in lit.iter_mut().zip(thresholds(&weights)) {
+        light.threshold = threshold;
+    }
+    lit
+}
+
+/// 1 minus the cosine of half the angle across a disk, radians.
+fn spread(angle: f32) -> f32 {
+    let sine = libm::sinf(0.25 * angle);
+    (2.0 * sine * sine).clamp(0.0, 1.0)
 }

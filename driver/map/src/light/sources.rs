@@ -1,17 +1,19 @@
 //! Sources of photons, chosen in proportion to their power.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use photoncard_firmware::scene::light::environment_direction;
 use photoncard_scene::Scene;
+use photoncard_shared::layout::DistantLight;
 
 use super::environment::Cells;
 use super::environment_parts::{Parts, SIDE};
 use super::shares::projected_area;
 use super::targets::Targets;
 use super::thresholds::thresholds;
-use super::{Lights, mean};
+use super::{Lights, Profiles, mean};
 
 /// A source of photons.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,10 +22,14 @@ pub(crate) enum Source {
     Emitter(u32),
     /// A distant light.
     Distant {
-        /// Unit vector along which the light travels.
+        /// Unit vector along which the light travels, from the middle of its disk.
         direction: Vec3,
-        /// Irradiance of a surface that faces the light, W/m^2.
+        /// 1 minus the cosine of the disk's half angle; 0 for parallel light.
+        spread: f32,
+        /// Radiance times solid angle, W/m^2.
         irradiance: Vec3,
+        /// Light group.
+        light_group: u8,
     },
     /// A cell of the environment, or a part of one.
     Cell {
@@ -47,6 +53,8 @@ pub(crate) struct Sources {
     /// Distance from the box, metres, beyond which nothing of the scene can hide the box; 0 if the box
     /// contains the scene.
     pub(crate) beyond: f32,
+    /// Directions of lights with profiles.
+    pub(crate) profiles: Arc<Profiles>,
     /// Targets at which photons are aimed; empty if photons are not aimed.
     pub(crate) targets: Targets,
     /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
@@ -127,9 +135,13 @@ impl Sources {
         for light in &lights.distant {
             let [direction, irradiance] = [light.direction, light.irradiance].map(Vec3::from);
             let area = shown(direction.as_dvec3());
-            let strongest = f64::from(irradiance.max_element()) * area;
+            // No component of a direction in the disk differs from that of its axis by more than the chord.
+            let chord = libm::sqrt(2.0 * f64::from(light.spread));
+            let rest = if is_aimed { 0.0 } else { chord * projected_area(size, DVec3::ONE) };
+            let strongest = f64::from(irradiance.max_element()) * (area + rest);
+            let DistantLight { light_group, spread, .. } = *light;
             all.add(
-                Source::Distant { direction, irradiance },
+                Source::Distant { direction, spread, irradiance, light_group },
                 mean(irradiance) * area,
                 strongest,
                 f64::INFINITY,
@@ -149,6 +161,7 @@ impl Sources {
             thresholds,
             bounds,
             beyond: if part.is_some() { whole.0.distance(whole.1) } else { 0.0 },
+            profiles: Arc::clone(&lights.profiles),
             targets,
         }
     }
@@ -286,7 +299,9 @@ impl AllSources {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use photoncard_scene::{Environment, Material, PunctualKind, PunctualLight, SceneContents, Triangle};
+    use photoncard_scene::{
+        Environment, LightAxes, Material, PunctualKind, PunctualLight, SceneContents, Triangle,
+    };
 
     /// A lamp of radiance 3 W/(sr m^2) and area 1/2 m^2, with the other contents.
     fn lamp(others: SceneContents) -> Sources {
@@ -304,6 +319,7 @@ mod tests {
             name: "dim".into(),
             kind: PunctualKind::Point { position: Vec3::ZERO },
             intensity: Vec3::splat(1e-3),
+            axes: LightAxes::default(),
         };
         let with_point = lamp(SceneContents { lights: vec![light], ..SceneContents::default() }).radiance;
         assert_eq!([with_point.mean, with_point.greatest], [f64::INFINITY; 2]);
@@ -324,6 +340,7 @@ mod tests {
             name: "lamp".into(),
             kind: PunctualKind::Point { position: Vec3::ZERO },
             intensity: Vec3::splat(intensity),
+            axes: LightAxes::default(),
         };
         let scene = Scene::from(SceneContents {
             lights: vec![light(1.0), light(3.0)],

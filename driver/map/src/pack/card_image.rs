@@ -6,8 +6,10 @@ use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::address::{LINE_BYTES, Line};
-use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
-use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
+use photoncard_shared::image::{HEADER_LINES, Header, HeaderError, Lights, Section, SectionKind};
+use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, Sensor, WideNode};
+
+use super::error::PackError;
 
 const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::Emitters,
@@ -119,6 +121,24 @@ impl CardImage {
         dark
     }
 
+    /// Copy of the card image with sensors behind its sections
+    /// ([`Projection::Sensors`](photoncard_shared::message::Projection::Sensors)) and the radiance unit
+    /// `radiance_unit`, a power of two, and the line of the first sensor.
+    ///
+    /// # Errors
+    /// [`PackError::TooLarge`] if there are more lines than 32 bits can count.
+    pub fn with_sensors(&self, sensors: &[Sensor], radiance_unit: f32) -> Result<(Self, u32), PackError> {
+        let more = sensors.len().div_ceil(Sensor::PER_LINE);
+        let all = self.lines.len() + more;
+        let too_large = |_| PackError::TooLarge { bytes: all as u64 * LINE_BYTES as u64 };
+        let header = Header { lines: u32::try_from(all).map_err(too_large)?, radiance_unit, ..self.header };
+        let mut lines = Vec::with_capacity(all);
+        lines.extend_from_slice(&self.lines);
+        lines.extend(pack_lines(sensors.iter().map(Sensor::to_bytes)));
+        lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
+        Ok((Self { header, lines }, self.header.lines))
+    }
+
     /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without
     /// triangles.
     pub(super) fn bounds(&self) -> Option<NodeBox> {
@@ -131,4 +151,20 @@ impl CardImage {
     pub fn diagonal(&self) -> f32 {
         self.bounds().map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
     }
+}
+
+/// Packs records into lines; no record straddles two lines.
+pub(super) fn pack_lines<const N: usize>(
+    records: impl Iterator<Item = [u8; N]>,
+) -> impl Iterator<Item = Line> {
+    let per_line = LINE_BYTES / N;
+    let mut records = records.peekable();
+    std::iter::from_fn(move || {
+        records.peek()?;
+        let mut line = Line::ZERO;
+        for (slot, record) in line.0.as_chunks_mut::<N>().0.iter_mut().zip(records.by_ref().take(per_line)) {
+            *slot = record;
+        }
+        Some(line)
+    })
 }

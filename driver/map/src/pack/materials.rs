@@ -25,13 +25,18 @@ pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec
     }
     let mut layers = 0..;
     let materials = scene.materials.iter().zip(has_attributes).zip(uncovered);
-    let record_of = |((material, has_attributes), &is_uncovered): ((&Material, bool), &bool)| {
-        let mut attributes = if has_attributes || is_uncovered { HAS_ATTRIBUTES } else { 0 };
-        attributes |= if material.blends && is_uncovered { BLENDS } else { 0 };
-        let layers = material.layers.as_ref().and_then(|_| layers.next());
-        record(material, attributes | lobe_flag(scene, material), layers)
-    };
-    materials.map(record_of).collect()
+    let record_of =
+        |(index, ((material, has_attributes), &is_uncovered)): (usize, ((&Material, bool), &bool))| {
+            let mut attributes = if has_attributes || is_uncovered { HAS_ATTRIBUTES } else { 0 };
+            attributes |= if material.blends && is_uncovered { BLENDS } else { 0 };
+            let layers = material.layers.as_ref().and_then(|_| layers.next());
+            let light_group = scene.light_groups.of_material(index);
+            layout::Material {
+                light_group,
+                ..record(material, attributes | lobe_flag(scene, material), layers)
+            }
+        };
+    materials.enumerate().map(record_of).collect()
 }
 
 /// Record of a material without the flags that depend on its scene.
@@ -82,6 +87,7 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::M
             texture(material.emissive_texture),
         ],
         layers,
+        light_group: 0,
     }
 }
 

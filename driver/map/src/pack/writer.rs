@@ -4,7 +4,7 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
 use photoncard_shared::layout::PhotonGrid;
 
-use super::card_image::{CardImage, room_for_photons};
+use super::card_image::{CardImage, pack_lines, room_for_photons};
 use super::error::PackError;
 
 /// Writer of a card image. It appends sections after the last line.
@@ -98,18 +98,4 @@ fn section(first: usize, records: usize, lines: usize) -> Result<Section, PackEr
     let [first_line, records, end] =
         [first, records, end].map(|count| u32::try_from(count).map_err(too_large));
     end.and(Ok(Section { first_line: first_line?, records: records? }))
-}
-
-/// Packs records into lines; no record straddles two lines.
-fn pack_lines<const N: usize>(records: impl Iterator<Item = [u8; N]>) -> impl Iterator<Item = Line> {
-    let per_line = LINE_BYTES / N;
-    let mut records = records.peekable();
-    std::iter::from_fn(move || {
-        records.peek()?;
-        let mut line = Line::ZERO;
-        for (slot, record) in line.0.as_chunks_mut::<N>().0.iter_mut().zip(records.by_ref().take(per_line)) {
-            *slot = record;
-        }
-        Some(line)
-    })
 }

@@ -110,7 +110,7 @@ mod tests {
         let position = [x, 100.0, 100.0];
         StoredPhoton::new(
             &PhotonGrid::UNIT,
-            &Photon { position, power, direction: [0; 2], axis: 0, normal, disc: FULL_DISC, direct },
+            &Photon { position, power, direction: [0; 2], axis_or_group: 0, normal, disc: FULL_DISC, direct },
         )
     }
 

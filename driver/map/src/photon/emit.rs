@@ -11,14 +11,15 @@ use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::light::{
-    EmitterPoint, emitter_point, environment_direction, environment_radiance, falloff, read_emitter,
+    EmitterPoint, ProfileFrame, disk_direction, emitter_point, environment_direction, environment_radiance,
+    falloff, profile_intensity, read_emitter,
 };
 use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit};
 use photoncard_shared::layout::{Emitter, EmitterKind};
 use photoncard_shared::message::Fault;
 
 use super::guide::{Guide, Point, Warped};
-use crate::light::{Aim, SolidCone, Source, Sources, Targets};
+use crate::light::{Aim, ProfileDirection, ProfileDirections, Profiles, SolidCone, Source, Sources, Targets};
 
 /// An emitted photon: the first ray of a path, and its power.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,8 @@ pub(super) struct Emission {
     pub(super) power: Vec3,
     /// True if the light comes from a surface or from the environment, which rays can hit.
     pub(super) has_extent: bool,
+    /// Light group of the light.
+    pub(super) light_group: u8,
 }
 
 /// Constants of the recurrence: 2^64 divided by the powers 1 to 4 of the root of `x^5 = x + 1`.
@@ -127,17 +130,21 @@ pub(super) fn emit(
     let (is_aimed, c) = sources.targets.is_aimed(c);
     let way = Way { targets: &sources.targets, is_aimed };
     let mut has_extent = true;
+    let light_group;
     let emission = match chosen.source {
         Source::Emitter(index) => {
             let emitter = read_emitter(scene, memory, index)?;
             has_extent = matches!(emitter.kind, EmitterKind::Triangle { .. });
-            from_emitter(scene, memory, &emitter, way, [chosen.rest, b, c, d])?
+            light_group = emitter.light_group;
+            from_emitter((scene, memory), &emitter, (way, &sources.profiles), [chosen.rest, b, c, d])?
         }
-        Source::Distant { direction, irradiance } => {
-            has_extent = false;
+        Source::Distant { direction, spread, irradiance, light_group: of_light } => {
+            (has_extent, light_group) = (false, of_light);
+            let direction = disk_direction(direction, spread, [chosen.rest, b]);
             from_afar((scene, memory), sources, way, (direction, irradiance), [c, d])?
         }
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
+            light_group = scene.header.lights.light_group;
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
             let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
@@ -147,6 +154,7 @@ pub(super) fn emit(
     let emission = emission.map(|emission| Emission {
         power: emission.power / chosen.probability,
         has_extent,
+        light_group,
         ..emission
     });
     let emission = emission.filter(|emission| emission.power.max_element() > 0.0);
@@ -194,10 +202,9 @@ impl Way<'_> {
 
 /// Samples the emission of an emitter, as if it were the only source.
 fn from_emitter(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
+    (scene, memory): (&SceneImage, &mut impl MemoryPort),
     emitter: &Emitter,
-    way: Way,
+    (way, profiles): (Way, &Profiles),
     [a, b, c, d]: [f32; 4],
 ) -> Result<Option<Emission>, Fault> {
     let intensity = Vec3::from(emitter.emission);
@@ -220,36 +227,83 @@ fn from_emitter(
                 ray,
                 power: power * area,
                 has_extent: true,
+                light_group: 0,
             })
         }
         EmitterKind::Point { position } => {
-            from_point(way, position.into(), SolidCone::ALL, [c, d], |_| intensity)
+            from_point(way, position.into(), &SolidCone::ALL, [c, d], |_| intensity)
         }
         EmitterKind::Spot { position, direction, scale, offset } => {
             let axis = Vec3::from(direction);
             let height = (1.0 + offset / scale).clamp(0.0, 2.0);
             let towards = |direction: Vec3| intensity * falloff(axis.dot(direction), scale, offset);
-            from_point(way, position.into(), SolidCone { axis, height }, [c, d], towards)
+            from_point(way, position.into(), &SolidCone { axis, height }, [c, d], towards)
+        }
+        EmitterKind::Profile { position, aim, across, texture } => {
+            let Some(directions) = profiles.get(&texture) else { return Ok(None) };
+            let beam = Beam { directions, frame: ProfileFrame::new(aim, across) };
+            let Some(emission) = from_point(way, position.into(), &beam, [c, d], |_| intensity) else {
+                return Ok(None);
+            };
+            let local = beam.frame.local(emission.ray.direction);
+            let relative = profile_intensity(scene, memory, texture, local)?;
+            Some(Emission { power: emission.power * relative, ..emission })
         }
     })
 }
 
-/// Samples the emission of a point light. `intensity` returns its radiant intensity in a direction, W/sr,
-/// which is 0 outside the cone. The direction is sampled towards the targets, or in the cone.
+/// Distribution of the directions of photons from a point.
+trait Directions {
+    fn aim(&self, square: [f32; 2]) -> Aim;
+
+    /// Probability density of a direction, 1/sr.
+    fn density(&self, direction: Vec3) -> f32;
+}
+
+impl Directions for SolidCone {
+    fn aim(&self, square: [f32; 2]) -> Aim {
+        Aim { towards: self.direction(square), measure: self.solid_angle() }
+    }
+
+    fn density(&self, direction: Vec3) -> f32 {
+        if self.holds(direction) { 1.0 / self.solid_angle() } else { 0.0 }
+    }
+}
+
+/// Directions of a profile, in its light's frame.
+#[derive(Clone, Copy)]
+struct Beam<'p> {
+    directions: &'p ProfileDirections,
+    frame: ProfileFrame,
+}
+
+impl Directions for Beam<'_> {
+    fn aim(&self, square: [f32; 2]) -> Aim {
+        let ProfileDirection { local, density } = self.directions.sample(square);
+        Aim { towards: self.frame.world(local).normalize(), measure: 1.0 / density }
+    }
+
+    fn density(&self, direction: Vec3) -> f32 {
+        self.directions.density(self.frame.local(direction))
+    }
+}
+
+/// Samples the emission of a light at a point. `intensity` returns its radiant intensity in a direction,
+/// W/sr, which is 0 where `directions` has none. The direction is sampled towards the targets, or by
+/// `directions`.
 fn from_point(
     way: Way,
     position: Vec3,
-    cone: SolidCone,
+    directions: &impl Directions,
     square: [f32; 2],
     intensity: impl Fn(Vec3) -> Vec3,
 ) -> Option<Emission> {
-    let free = Aim { towards: cone.direction(square), measure: cone.solid_angle() };
-    let Aim { towards, measure } = if way.is_aimed { way.targets.direction(position, square)? } else { free };
+    let Aim { towards, measure } =
+        if way.is_aimed { way.targets.direction(position, square)? } else { directions.aim(square) };
     let ray = Ray::new(position, towards);
-    let emission = Emission { ray, power: intensity(towards) * measure, has_extent: true };
+    let emission = Emission { ray, power: intensity(towards) * measure, has_extent: true, light_group: 0 };
     way.balanced(Some(emission), |_| {
-        let free = if cone.holds(towards) { 1.0 / cone.solid_angle() } else { 0.0 };
-        [way.targets.direction_density(position, towards), free]
+        [way.targets.direction_density(position, towards), directions.density(towards)]
     })
 }
 
@@ -268,6 +322,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
         ray: Ray::new(white.offset_origin(), sampled.direction),
         power: point.emission * (PI * sides),
         has_extent: true,
+        light_group: 0,
     })
 }
 
@@ -281,6 +336,7 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
         ray: Ray::new(origin, towards),
         power: point.emission * (cosine.abs() * measure),
         has_extent: true,
+        light_group: 0,
     })
 }
 
@@ -300,7 +356,12 @@ fn from_afar(
             // The origin lies before the whole box.
             let corners = bounds.map(|corner| corner * direction);
             let origin = towards + direction * corners[0].min(corners[1]).element_sum();
-            Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true }
+            Emission {
+                ray: Ray::new(origin, direction),
+                power: irradiance * measure,
+                has_extent: true,
+                light_group: 0,
+            }
         })
     } else {
         Some(through_box(bounds, direction, irradiance, square))
@@ -360,5 +421,5 @@ fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f3
     place[(axis + 1) % 3] = across;
     place[(axis + 2) % 3] = d;
     let origin = lower + size * Vec3::from(place);
-    Emission { ray: Ray::new(origin, direction), power: irradiance * area, has_extent: true }
+    Emission { ray: Ray::new(origin, direction), power: irradiance * area, has_extent: true, light_group: 0 }
 }

@@ -18,15 +18,15 @@ pub(crate) struct StoredPhoton {
 }
 
 const COORDINATE_MASK: u64 = (1 << GRID_BITS) - 1;
-/// Bit offset of the kd-tree's splitting axis in [`StoredPhoton::content`]. The axis is 0 unless the photons
-/// are in a kd-tree.
+/// Bit offset in [`StoredPhoton::content`] of the photon's light group or, in a kd-tree, of the splitting
+/// axis.
 const AXIS_SHIFT: u32 = 48;
 const AXIS_MASK: u64 = 3 << AXIS_SHIFT;
 
 impl StoredPhoton {
     /// Encodes a photon and moves it to the nearest grid point.
     pub(crate) fn new(grid: &PhotonGrid, photon: &Photon) -> Self {
-        let content = Photon::content(&Photon { axis: 0, ..*photon }.to_bytes());
+        let content = Photon::content(&photon.to_bytes());
         Self::at(grid.nearest(photon.position), content)
     }
 
@@ -73,6 +73,11 @@ impl StoredPhoton {
     /// Returns true if the photon came straight from a light.
     pub(crate) fn is_direct(self) -> bool {
         Photon::direct_of_flags(self.flags())
+    }
+
+    /// Light group of the photon's light, unless the photons are in a kd-tree.
+    pub(crate) fn light_group(self) -> u8 {
+        Photon::light_group_of_flags(self.flags())
     }
 
     /// Unit normal of the photon's surface.

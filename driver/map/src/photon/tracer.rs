@@ -140,7 +140,8 @@ impl<'s> Tracer<'s> {
                     };
                     // Light that comes through a surface is stored at the side where it arrives.
                     if !surface.is_behind && self.packed.stores_photons_at(surface.position) {
-                        photons.push(self.stored(&surface, arrived, flag, random.dither()));
+                        let marks = (flag, emission.light_group);
+                        photons.push(self.stored(&surface, arrived, marks, random.dither()));
                     }
                     if self.purpose == Purpose::Caustics {
                         break;
@@ -161,13 +162,19 @@ impl<'s> Tracer<'s> {
 
     /// Encodes a photon that arrives at a surface. Its power is divided by the product of the surface's layer
     /// probability and coverage, because photons and gathers reach the base layer only with this probability.
-    fn stored(&self, surface: &Surface, arrived: Vec3, direct: bool, dither: u32) -> StoredPhoton {
+    fn stored(
+        &self,
+        surface: &Surface,
+        arrived: Vec3,
+        (direct, light_group): (bool, u8),
+        dither: u32,
+    ) -> StoredPhoton {
         let power = arrived / (surface.probability * surface.coverage);
         let photon = Photon {
             position: surface.position.to_array(),
             power: Rgbe::encode((power / self.path_unit).to_array(), dither),
             direction: encode_direction(surface.outgoing.to_array()),
-            axis: 0,
+            axis_or_group: light_group,
             normal: encode_normal(surface.normal.to_array()),
             disc: FULL_DISC,
             direct,

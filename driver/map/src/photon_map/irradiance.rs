@@ -9,6 +9,7 @@
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
 use photoncard_firmware::kind::ReferenceCandidates;
+use photoncard_firmware::light_groups::LightGroups;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{GatherLimits, gathered_radiance};
 use photoncard_firmware::scene::{PartialReflection, SceneImage};
@@ -81,7 +82,12 @@ impl<'a> Estimator<'a> {
             scene,
             memory,
             buffer: Box::default(),
-            limits: GatherLimits { neighbors, max_distance, free_within: f32::INFINITY },
+            limits: GatherLimits {
+                neighbors,
+                max_distance,
+                free_within: f32::INFINITY,
+                groups: LightGroups::ONE,
+            },
         }
     }
 
@@ -97,7 +103,7 @@ impl<'a> Estimator<'a> {
             buffer.view(),
             &mut |_, _, _| {},
         )?;
-        let irradiance = irradiance.to_array();
+        let irradiance = irradiance.total(LightGroups::ONE).to_array();
         Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))
     }
 }

@@ -78,7 +78,7 @@ mod tests {
             position: position.to_array(),
             power: Rgbe::encode([1.0; 3], 0),
             direction: encode_direction(direction.to_array()),
-            axis: 0,
+            axis_or_group: 0,
             normal: encode_normal([0.0, 1.0, 0.0]),
             disc: FULL_DISC,
             direct: false,

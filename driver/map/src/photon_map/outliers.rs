@@ -90,6 +90,11 @@ impl<'a> Map<'a> {
         self.colours[photon].element_sum()
     }
 
+    /// Returns whether two photons carry light of one group, so that neither group gains or loses power.
+    fn is_of_group(&self, photon: usize, other: usize) -> bool {
+        self.stored[photon].light_group() == self.stored[other].light_group()
+    }
+
     /// Power that a photon gives; `None` if it is not much stronger than its neighbours.
     fn gift(&self, photon: usize) -> Result<Option<Gift>, Fault> {
         let own = self.power(photon);
@@ -108,7 +113,7 @@ impl<'a> Map<'a> {
             let mut to = Vec::with_capacity(nearest.len());
             for (squared, other) in nearest {
                 let weight = self.power(other) * f64::from(1.0 - squared / reach);
-                if weight > 0.0 && self.sees(photon, other)? {
+                if weight > 0.0 && self.is_of_group(photon, other) && self.sees(photon, other)? {
                     to.push((other, weight));
                 }
             }
@@ -187,7 +192,7 @@ mod tests {
             },
             power: Rgbe::encode([1.0, 0.5, 0.25].map(|channel| channel * power(index)), 0),
             direction: [0; 2],
-            axis: 0,
+            axis_or_group: 0,
             normal: encode_normal([0.0, 1.0, 0.0]),
             disc: FULL_DISC,
             direct: false,

@@ -2,14 +2,17 @@
 //!
 //! A file has one part. Radiance is in the unnamed layer, in the channels `R G B`, which every viewer shows.
 //! Layers are in channels such as `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The
-//! data window is the film's crop window, the display window the full picture. A transparent picture has the
-//! channel `A` beside them: radiance is premultiplied. The picture's provenance is JSON in the attribute
-//! `photoncard`; mattes have attributes of their own ([`crate::cryptomatte`]). The `exr` crate keeps these
-//! attributes in a hash map; `attributes` sorts them. The standard attribute `comments` contains the file's
-//! checksum, by which [`is_intact`] recognises a truncated or damaged file.
+//! light of a light group is in a layer such as `light_key` ([`mix`]). The data window is the film's crop
+//! window, the display window the full picture. A transparent picture has the channel `A` beside them:
+//! radiance is premultiplied. The picture's provenance is JSON in the attribute `photoncard`; mattes have
+//! attributes of their own ([`crate::cryptomatte`]). The `exr` crate keeps these attributes in a hash map;
+//! `attributes` sorts them. The standard attribute `comments` contains the file's checksum, by which
+//! [`is_intact`] recognises a truncated or damaged file.
 
 mod attributes;
 mod dwa;
+pub mod mix;
+mod plain;
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -24,6 +27,7 @@ use exr::prelude::{
 };
 use thiserror::Error;
 
+pub use self::plain::square_bytes;
 use crate::allocation::{self, OutOfMemory};
 use crate::choice::choices;
 use crate::cryptomatte::{self, Identities, Matte};
@@ -159,19 +163,28 @@ pub struct Content<'a> {
     pub is_transparent: bool,
     /// Names for the mattes; `None` leaves mattes out.
     pub identities: Option<&'a Identities>,
+    /// Illuminance of the film's pixels, lx, row by row: the layer `illuminance`, in single precision.
+    pub illuminance: Option<&'a [f32]>,
 }
 
 impl<'a> Content<'a> {
     /// Contents of a picture with a background, without a denoised layer or mattes.
     pub fn new(film: &'a Film, layers: &'a Layers) -> Self {
-        Self { film, layers, denoised: None, is_transparent: false, identities: None }
+        Self { film, layers, denoised: None, is_transparent: false, identities: None, illuminance: None }
     }
 }
 
+/// Start of the names of the layers with a light group's light.
+pub const GROUP_PREFIX: &str = "light_";
+/// Channels of a colour.
+const COLOUR: [&str; 3] = ["R", "G", "B"];
 /// Channels of radiance.
-const RENDERED: [&str; 3] = ["R", "G", "B"];
+const RENDERED: [&str; 3] = COLOUR;
 /// Channels of the layer [`Content::denoised`].
 const DENOISED: [&str; 3] = ["denoised.R", "denoised.G", "denoised.B"];
+
+/// Channel of the layer [`Content::illuminance`].
+const ILLUMINANCE: &str = "illuminance.Y";
 
 /// Writes a picture to `path` in the format of [`bytes`], whole or not at all.
 ///
@@ -244,7 +257,7 @@ fn image_of(
 }
 
 fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples> {
-    let Content { film, layers, denoised, is_transparent, identities: _ } = content;
+    let Content { film, layers, denoised, is_transparent, identities: _, illuminance } = content;
     let mut asked: Vec<(Channel, SampleFormat)> = Vec::new();
     asked.extend(Layers::colour().iter().map(|channel| (*channel, format)));
     asked.extend(is_transparent.then_some((COLOUR_ALPHA, format)));
@@ -257,6 +270,8 @@ fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples>
         let values = matte.values(film, identities).into_iter();
         list.extend(matte.channels().zip(values).map(|(name, values)| single(&name, values)));
     }
+    list.extend(light_groups(film));
+    list.extend(illuminance.map(|values| single(ILLUMINANCE, values.to_vec())));
     if let Some(radiance) = denoised {
         let of_channel = |(index, name)| any_channel(name, radiance.iter().map(|pixel| pixel[index]), format);
         list.extend(DENOISED.into_iter().enumerate().map(of_channel));
@@ -285,6 +300,28 @@ fn of_film<'a>(
         }
     }
     asked.iter().zip(samples).map(|((channel, _), samples)| AnyChannel::new(channel.name, samples))
+}
+
+/// Name of a channel, `R`, `G` or `B`, of a light group.
+fn name_of_group(group: &str, channel: &str) -> String {
+    format!("{GROUP_PREFIX}{group}.{channel}")
+}
+
+/// Channels of a film's light groups, always in single precision: they add up to the radiance.
+fn light_groups(film: &Film) -> Vec<AnyChannel<FlatSamples>> {
+    let names = film.light_groups().iter();
+    let names: Vec<String> =
+        names.flat_map(|group| COLOUR.map(|channel| name_of_group(group, channel))).collect();
+    let mut values = vec![Vec::new(); names.len()];
+    if !names.is_empty() {
+        for pixel in film.all() {
+            values
+                .iter_mut()
+                .zip(pixel.light_groups.as_flattened())
+                .for_each(|(list, value)| list.push(*value));
+        }
+    }
+    names.iter().zip(values).map(|(name, values)| single(name, values)).collect()
 }
 
 /// Mattes of a picture with names.
@@ -342,6 +379,8 @@ pub enum Shown {
     /// The layer [`Content::denoised`], which tone-mapped pictures show; in a file without that layer the
     /// same as [`Self::Rendered`].
     Denoised,
+    /// The layer [`Content::illuminance`], lx, in each of the three channels.
+    Illuminance,
 }
 
 /// Reads the three channels that `shown` selects, from the first part that has them. Their samples can be
@@ -351,13 +390,17 @@ pub enum Shown {
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
 /// too short for the size that it states is refused before memory for its pixels is allocated.
 pub fn read(path: &Path, shown: Shown) -> Result<RgbImage, ExrError> {
+    decode_walled(path, &bytes_of(path)?, MAX_READ_PIXELS, shown)
+}
+
+/// Bytes of a regular file.
+fn bytes_of(path: &Path) -> Result<Vec<u8>, ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
     if !found.is_file() {
         return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    decode_walled(path, &bytes, MAX_READ_PIXELS, shown)
+    std::fs::read(path).map_err(unreadable)
 }
 
 /// Reads the provenance of a picture and the type of its samples, without its pixels; `None` if this program
@@ -402,22 +445,18 @@ fn decode_walled(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> R
 fn decode(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<RgbImage, ExrError> {
     let malformed =
         |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
-    MetaData::validate(&meta.headers, false).map_err(malformed)?;
-    for header in &meta.headers {
-        check_size(path, header, bytes.len() as u64, most_pixels)?;
-    }
+    let meta = checked(path, bytes, most_pixels)?;
     let is_denoised = meta.headers.iter().any(|header| has_channels(header, &DENOISED));
-    let [red, green, blue] = if shown == Shown::Denoised && is_denoised { DENOISED } else { RENDERED };
+    let [red, green, blue] = match shown {
+        Shown::Denoised if is_denoised => DENOISED,
+        Shown::Rendered | Shown::Denoised => RENDERED,
+        // The reader takes each channel once.
+        Shown::Illuminance => [ILLUMINANCE, "R", "G"],
+    };
     if !meta.headers.iter().any(|header| has_channels(header, &[red, green, blue])) {
         let names = meta.headers.iter().flat_map(|header| header.channels.list.iter());
         let names: Vec<_> = names.take(20).map(|channel| channel.name.to_string()).collect();
         return Err(ExrError::NoColour { path: path.to_owned(), channels: names.join(", ") });
-    }
-    let has_dwa = meta.headers.iter().any(|header| dwa::is_dwa(header.compression));
-    if has_dwa && !dwa::states_possible_sizes(bytes).map_err(malformed)? {
-        let reason = "a block states more samples than it has".to_owned();
-        return Err(ExrError::Malformed { path: path.to_owned(), reason });
     }
     let image = reader()
         .no_deep_data()
@@ -449,8 +488,28 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<R
     let layer = image.layer_data;
     let provenance = provenance(&layer.attributes);
     let Vec2(x, y) = layer.attributes.layer_position;
-    let ReadPixels { width, colours: pixels, alpha } = layer.channel_data.pixels;
+    let ReadPixels { width, colours: mut pixels, alpha } = layer.channel_data.pixels;
+    if shown == Shown::Illuminance {
+        pixels.iter_mut().for_each(|pixel| *pixel = [pixel[0]; 3]);
+    }
     Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels, alpha, provenance })
+}
+
+/// Reads the headers of a file, and checks that decoding its pixels is safe.
+fn checked(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<MetaData, ExrError> {
+    let malformed =
+        |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
+    MetaData::validate(&meta.headers, false).map_err(malformed)?;
+    for header in &meta.headers {
+        check_size(path, header, bytes.len() as u64, most_pixels)?;
+    }
+    let has_dwa = meta.headers.iter().any(|header| dwa::is_dwa(header.compression));
+    if has_dwa && !dwa::states_possible_sizes(bytes).map_err(malformed)? {
+        let reason = "a block states more samples than it has".to_owned();
+        return Err(ExrError::Malformed { path: path.to_owned(), reason });
+    }
+    Ok(meta)
 }
 
 /// Pixels of a part of a file while they are read, row by row.

@@ -12,9 +12,8 @@ use photoncard_firmware::kind::{
 };
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::{
-    Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS,
-    MAX_WAITING_POINTS, SUMS_WITH_LAYERS, gather_buckets, gather_candidates, places_of_buckets,
-    places_of_gathering,
+    Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_SUMS, MAX_TILE_PIXELS, MAX_WAITING_BLOCKS,
+    MAX_WAITING_POINTS, gather_buckets, gather_candidates, places_of_buckets, places_of_gathering,
 };
 use serde_json::{Value, json};
 
@@ -33,7 +32,7 @@ const RANGES: [(&str, RangeInclusive<u64>); 16] = [
     ("photon_cache_bytes", 1..=MAX_SRAM),
     ("scene_cache_bytes", 1..=MAX_SRAM),
     ("stack_bytes", 0..=MAX_SRAM),
-    ("tile_pixels", SUMS_WITH_LAYERS as u64..=MAX_TILE_PIXELS as u64),
+    ("tile_pixels", MAX_SUMS as u64..=MAX_TILE_PIXELS as u64),
     ("neighbors", 2..=REFERENCE.neighbors as u64),
     ("gather_rays", 1..=MAX_GATHER_RAYS as u64),
     ("gather_queue", 1..=1 << 20),

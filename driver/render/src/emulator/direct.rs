@@ -8,7 +8,6 @@ use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_map::pack::CardImage;
 use photoncard_picture::sums::{FilmPixel, SumFormat};
-use photoncard_shared::budget::sums_of_pixel;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
 use rayon::ThreadPool;
@@ -23,7 +22,7 @@ use super::{EmulatedChip, EmulatedKind};
 /// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
     /// Sums of light over the samples of each pixel, row by row, in the card image's radiance units. A pixel
-    /// has one sum, or with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`] sums.
+    /// has [`photoncard_shared::message::PixelForm::sums_of_light`] sums.
     pub sums: Vec<ColourSum>,
     /// Albedo, normal and depth of the pixels, row by row.
     pub views: Vec<PixelView>,
@@ -72,7 +71,7 @@ impl RenderedTile {
     /// Assembles a tile from complete pixels in any order.
     fn new(mut pixels: Vec<FinishedPixel>, frame: &FrameParameters, counters: Counters) -> Self {
         pixels.sort_by_key(|pixel| pixel.index);
-        let mut sums = Vec::with_capacity(pixels.len() * sums_of_pixel(frame.layers) as usize);
+        let mut sums = Vec::with_capacity(pixels.len() * frame.form().sums_of_light() as usize);
         pixels.iter().for_each(|pixel| sums.extend_from_slice(pixel.light.sums(frame)));
         let views = pixels.into_iter().map(|pixel| pixel.view).collect();
         Self { sums, views, counters, traffic: MemoryTraffic::ZERO, reuse: None }
@@ -80,8 +79,11 @@ impl RenderedTile {
 
     /// Values of the pixels, row by row. `format` is the format of the frame's sums.
     pub fn pixels(&self, format: SumFormat) -> impl Iterator<Item = FilmPixel> {
-        let sums = self.sums.chunks(sums_of_pixel(format.form.layers) as usize);
-        self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light), [0.0; 3]))
+        let sums = self.sums.chunks(format.form.sums_of_light() as usize);
+        let values = move |(view, light): (&PixelView, &[ColourSum])| {
+            format.values(&view.sums(format.form, light), [0.0; 3])
+        };
+        self.views.iter().zip(sums).map(values)
     }
 }
 

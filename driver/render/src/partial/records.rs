@@ -142,7 +142,8 @@ fn read_tile(
     if !read_all(reader, &mut bytes[MAGIC.len()..])? {
         return Ok(None);
     }
-    let pixel_bytes = kept.format().record_bytes();
+    let form = kept.format().form;
+    let pixel_bytes = form.record_bytes();
     let Some((tile, samples)) = tile_at(&bytes[MAGIC.len()..], kept.window()) else { return Ok(None) };
     let length = (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * pixel_bytes as u64;
     let behind_magic = length - MAGIC.len() as u64;
@@ -158,7 +159,8 @@ fn read_tile(
         return Ok(None);
     }
     let records = bytes[HEAD_BYTES..].chunks_exact(pixel_bytes);
-    let Some(all) = records.map(PixelSums::read).collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let all = records.map(|record| PixelSums::read(form, record)).collect::<Option<Vec<_>>>();
+    let Some(all) = all else { return Ok(None) };
     if let Some(film) = kept.film_of(samples) {
         for ((x, y), sums) in pixel_positions(&tile).zip(&all) {
             // Writing cannot fail: the tile lies inside the window.

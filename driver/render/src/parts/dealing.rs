@@ -52,6 +52,12 @@ impl Part {
         self.count
     }
 
+    /// Items of the part, of `all` numbered ones: the number of the first, from 0, and one behind the last.
+    pub fn range(self, all: u64) -> [u64; 2] {
+        let [number, count] = [self.number, self.count].map(u64::from);
+        [number - 1, number].map(|number| all * number / count)
+    }
+
     /// Patches of the part, along the Hilbert curve. The patches of all parts cover the window exactly once.
     pub fn patches(self, window: Window) -> Vec<Tile> {
         deal(window, self.count).filter(|(part, _)| *part == self).map(|(_, patch)| patch).collect()
@@ -66,6 +72,16 @@ impl Part {
         let all = self.patches(window).into_iter().flat_map(of_patch);
         all.zip(0..).map(|(tile, id)| Tile { id, ..tile }).collect()
     }
+}
+
+/// Lists the first parts by name, and the number of the others.
+pub(crate) fn named(parts: &[Part]) -> String {
+    const NAMED: usize = 8;
+    let mut text = parts.iter().take(NAMED).map(Part::to_string).collect::<Vec<_>>().join(", ");
+    if parts.len() > NAMED {
+        text += &format!(" and {} more", parts.len() - NAMED);
+    }
+    text
 }
 
 impl fmt::Display for Part {

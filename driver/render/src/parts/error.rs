@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use photoncard_picture::film::FilmError;
 use photoncard_picture::output::OutputError;
 
-use super::dealing::Part;
+use super::dealing::{Part, named};
 
 /// Version of the format of a part's file. The first line states it.
 pub(super) const VERSION: u32 = 2;
@@ -83,14 +83,4 @@ pub enum PartError {
     /// A part cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-}
-
-/// Lists the first parts by name, and the number of the others.
-fn named(parts: &[Part]) -> String {
-    const NAMED: usize = 8;
-    let mut text = parts.iter().take(NAMED).map(Part::to_string).collect::<Vec<_>>().join(", ");
-    if parts.len() > NAMED {
-        text += &format!(" and {} more", parts.len() - NAMED);
-    }
-    text
 }

@@ -3,6 +3,7 @@
 use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::{Film, FilmError, PixelForm, SumFormat, Window};
 use photoncard_picture::layer::Layers;
+use photoncard_scene::LightGroups;
 use photoncard_shared::message::SumScale;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -31,6 +32,9 @@ pub struct PartHead {
     /// Names for the picture's mattes; left out without mattes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identities: Option<Identities>,
+    /// Names of the picture's light groups; left out without groups.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub light_groups: Vec<String>,
 }
 
 fn is_zero(origin: &[f64; 3]) -> bool {
@@ -52,7 +56,8 @@ impl PartHead {
         // Only positions are in the file's coordinates.
         let origin = if film.format().form.position { film.origin() } else { [0.0; 3] };
         let identities = identities.filter(|_| layers.have_mattes()).cloned();
-        Self { part, settings, layers: layers.to_string(), command, units, origin, identities }
+        let light_groups = film.light_groups().to_vec();
+        Self { part, settings, layers: layers.to_string(), command, units, origin, identities, light_groups }
     }
 
     /// Returns whether the picture has alpha, and its radiance is premultiplied.
@@ -75,7 +80,8 @@ impl PartHead {
         let is_adaptive = self.settings.get("adaptive").is_some_and(Value::is_number);
         let scale = SumScale { radiance, depth };
         let form = layers.form();
-        let form = PixelForm { coverage: form.coverage || self.is_transparent(), ..form };
+        let light_groups = u8::try_from(self.light_groups.len()).ok()?;
+        let form = PixelForm { coverage: form.coverage || self.is_transparent(), light_groups, ..form };
         let format = SumFormat::of_range(form, (0, samples), is_adaptive, scale);
         let window = Window { x0, x1, y0, y1 };
         let is_possible = Film::check(width, height, window).is_ok()
@@ -83,9 +89,11 @@ impl PartHead {
             && is_unit(radiance)
             && is_unit(depth)
             && self.origin.iter().all(|coordinate| coordinate.is_finite())
-            && self.identities.is_some() == layers.have_mattes();
+            && self.identities.is_some() == layers.have_mattes()
+            && LightGroups::are_names(&self.light_groups);
         let (size, origin) = ([width, height], self.origin);
-        is_possible.then_some(PartPicture { size, window, format, origin, layers })
+        let light_groups = self.light_groups.clone();
+        is_possible.then_some(PartPicture { size, window, format, origin, layers, light_groups })
     }
 
     /// Describes the settings in which two heads differ. `own` and `others` name the files of the two heads.
@@ -105,6 +113,7 @@ impl PartHead {
             ("layers", [self, other].map(|head| head.layers.clone())),
             ("units", [self, other].map(|head| format!("{:x?}", head.units))),
             ("origin", [self, other].map(|head| format!("{:?}", head.origin))),
+            ("light groups", [self, other].map(|head| head.light_groups.join(", "))),
         ];
         let others_names = self.identities != other.identities;
         let of_names =
@@ -125,6 +134,7 @@ pub(super) struct PartPicture {
     pub(super) format: SumFormat,
     origin: [f64; 3],
     pub(super) layers: Layers,
+    light_groups: Vec<String>,
 }
 
 impl PartPicture {
@@ -136,6 +146,7 @@ impl PartPicture {
         let [width, height] = self.size;
         let mut film = Film::new(width, height, self.window, self.format)?;
         film.set_origin(self.origin);
+        film.set_light_groups(&self.light_groups);
         Ok(film)
     }
 }

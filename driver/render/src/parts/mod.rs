@@ -22,6 +22,7 @@ mod merge;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use self::dealing::named;
 pub use self::dealing::{MAX_PARTS, Part};
 pub use self::error::PartError;
 pub use self::file::write;

@@ -201,3 +201,16 @@ fn a_hostile_head_is_refused() {
     write(&path, &large, &blank).unwrap();
     assert!(matches!(refused(std::slice::from_ref(&path)), PartError::Damaged { .. }));
 }
+
+#[test]
+fn parts_cover_all_items_once() {
+    for (all, count) in [(0, 3), (1, 3), (10, 3), (1000, 7), (65_537, 2)] {
+        let mut next = 0;
+        for part in Part::all(count) {
+            let [first, end] = part.range(all);
+            assert_eq!(first, next);
+            next = end;
+        }
+        assert_eq!(next, all);
+    }
+}

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use photoncard_map::pack::CardImage;
 use photoncard_map::photon_map::PhotonsFor;
 use photoncard_picture::cryptomatte::Identities;
-use photoncard_scene::{Camera, Lens, Projection, Scene};
+use photoncard_scene::{Camera, Lens, LightGroups, Projection, Scene};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::Checksum;
 use photoncard_shared::image::SectionKind;
@@ -34,6 +34,7 @@ pub(super) struct Head {
     /// Checksums of the scene, with and without cameras.
     scene: [String; 2],
     is_specular: bool,
+    is_in_watts: bool,
     photons: PhotonMaps,
     integrator: Integrator,
     max_distance: f32,
@@ -43,6 +44,9 @@ pub(super) struct Head {
     /// without identities.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     identities: Option<(Identities, String)>,
+    /// Names of the scene's light groups; left out without groups.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    light_groups: Vec<String>,
     /// Cameras of the frames of an animation, by frame number.
     frames: BTreeMap<u32, StoredView>,
     notes: Map<String, Value>,
@@ -60,6 +64,7 @@ impl Head {
             offset: scene.offset.to_array(),
             scene: [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
             is_specular: scene.is_specular(),
+            is_in_watts: scene.is_in_watts,
             photons: photons.clone(),
             integrator: integrator.clone(),
             max_distance: *max_distance,
@@ -68,6 +73,7 @@ impl Head {
             identities: identities
                 .as_deref()
                 .map(|names| (names.clone(), scene.checksum_of_objects().to_owned())),
+            light_groups: scene.light_groups.names().to_vec(),
             frames: frames.iter().map(|(number, view)| (*number, StoredView::new(view))).collect(),
             notes: notes.clone(),
         }
@@ -87,6 +93,7 @@ impl Head {
             caustics,
             paths,
             identities,
+            light_groups,
             frames,
             notes,
             ..
@@ -119,7 +126,11 @@ impl Head {
         let prepared = Prepared { image, identities, max_distance, caustics, paths, guiding: None };
         let [checksum, without_cameras] = self.scene;
         let checksums = [checksum, without_cameras, objects.unwrap_or_default()];
-        let scene = Scene::of_cameras(cameras, offset.into(), checksums, self.is_specular);
+        if !LightGroups::are_names(&light_groups) {
+            return Err("its light groups are none");
+        }
+        let facts = [self.is_specular, self.is_in_watts];
+        let scene = Scene::of_cameras(cameras, offset.into(), light_groups, checksums, facts);
         let kept = Kept {
             scene: scene.checksum_without_cameras().to_owned(),
             photons: settings.photon_settings(&scene),

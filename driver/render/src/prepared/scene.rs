@@ -50,6 +50,7 @@ impl PreparedScene {
     ) -> Result<Self, RenderError> {
         settings.camera(scene)?;
         settings.check()?;
+        settings.check_groups_of(scene)?;
         check_cameras(settings.photons.photons_for)?;
         let mut times = Times::default();
         let (mut settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
@@ -62,9 +63,10 @@ impl PreparedScene {
         let scene = Scene::of_cameras(
             scene.cameras.clone(),
             scene.offset,
+            scene.light_groups.names().to_vec(),
             [scene.checksum(), scene.checksum_without_cameras(), scene.checksum_of_objects()]
                 .map(str::to_owned),
-            scene.is_specular(),
+            [scene.is_specular(), scene.is_in_watts],
         );
         Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
     }
@@ -92,8 +94,9 @@ impl PreparedScene {
         let Self { scene, .. } = self;
         let checksums = [checksum, scene.checksum_without_cameras(), scene.checksum_of_objects()];
         let checksums = checksums.map(str::to_owned);
-        let offset = self.scene.offset;
-        Some(Scene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
+        let (offset, groups) = (scene.offset, scene.light_groups.names().to_vec());
+        let facts = [scene.is_specular(), scene.is_in_watts];
+        Some(Scene::of_cameras(cameras.clone(), offset, groups, checksums, facts))
     }
 
     /// Scene with the cameras of the prepared scene, without triangles and other contents.

@@ -382,8 +382,8 @@ impl<'a> Pilot<'a> {
         let neighbors = settings.photons.caustic_neighbors;
         let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
         let frame = settings.frame(&camera, max_distance, caustics);
-        // The pilot reads light alone, and its card image may have no identities.
-        Ok(FrameParameters { position: false, coverage: false, identities: false, ..frame })
+        // The pilot reads the light of all groups alone, and its card image may have no identities.
+        Ok(FrameParameters { position: false, coverage: false, identities: false, light_groups: 0, ..frame })
     }
 
     fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {

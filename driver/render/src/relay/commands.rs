@@ -116,7 +116,7 @@ impl<L: CardLink> Relay<'_, L> {
         let fits =
             |first: u32, count: u32, size: u32| first.checked_add(count).is_some_and(|end| end <= size);
         let is_inside = fits(tile.x, tile.width, frame.width) && fits(tile.y, tile.height, frame.height);
-        let most = u64::from(self.budget.pixels_of_tile(frame.layers));
+        let most = u64::from(self.budget.pixels_of_tile(frame.form().sums_of_light()));
         if !is_inside || !(1..=most).contains(&tile.pixels()) {
             return Err(Fault { code: FaultCode::Tile, detail: tile.id });
         }

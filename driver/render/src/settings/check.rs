@@ -3,12 +3,15 @@
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_firmware::chip::least_waiting_lines;
+use photoncard_firmware::kind::MIN_RECORDS;
 use photoncard_map::pack::CardImage;
+use photoncard_map::photon_map::PhotonLayout;
 use photoncard_picture::choice::Choice;
 use photoncard_picture::film::Film;
+use photoncard_scene::Scene;
 use photoncard_shared::address::LINE_BYTES;
-use photoncard_shared::budget::{Budget, MAX_BINS};
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::budget::{Budget, MAX_BINS, MAX_LIGHT_GROUPS};
+use photoncard_shared::message::{FrameParameters, Radiance};
 
 use super::{MIN_IRRADIANCE_ERROR, Picture, RenderSettings};
 use crate::address::{CardAddress, check_chips, first_remote, is_one_emulated_chip};
@@ -35,6 +38,8 @@ impl RenderSettings {
         let caustic_photons = self.photons.caustic_photons.unwrap_or(0) as u64;
         within("photons.caustic_photons", caustic_photons, 0, MAX_PHOTONS as u64)?;
         within("schedule.bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
+        self.check_light_groups()?;
+        self.check_illuminance()?;
         self.check_irradiance_error()?;
         self.check_max_distance()?;
         self.check_adaptive_threshold()?;
@@ -80,7 +85,8 @@ impl RenderSettings {
         if let Some(in_flight) = self.schedule.in_flight {
             on_card("schedule.in_flight", in_flight, 1, budget.in_flight)?;
         }
-        on_card("schedule.tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
+        self.check_records_of_light_groups(budget)?;
+        on_card("schedule.tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(1).isqrt())?;
         self.check_tile_with_layers(budget)
     }
 
@@ -109,6 +115,86 @@ impl RenderSettings {
             remedy: "use sort, lower `photons.count`, or use a card with more memory (an emulated one by \
                      `CardAddress::with_memory`)"
                 .into(),
+        })
+    }
+
+    /// Checks the light groups, and that photons carry them.
+    fn check_light_groups(&self) -> Result<(), RenderError> {
+        let groups = &self.picture.light_groups;
+        let fault = |reason: String, remedy: &str| {
+            let (value, remedy) = (groups.join(","), remedy.into());
+            Err(RenderError::Setting { field: "picture.light_groups", value, reason, remedy })
+        };
+        if groups.len() > MAX_LIGHT_GROUPS {
+            return fault(format!("there can be {MAX_LIGHT_GROUPS} light groups"), "put sources together");
+        }
+        if !groups.is_empty() && self.photons.layout != PhotonLayout::Lines {
+            return fault("photons of a kd-tree carry no light group".into(), "use `photons.layout` lines");
+        }
+        if !groups.is_empty() && self.photons.radiance == Radiance::Precomputed {
+            return fault(
+                "precomputed irradiance is that of all light groups".into(),
+                "use `photons.radiance` density",
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks that the layer of illuminance, which is a frame of its own, is not asked of a part, and that
+    /// its efficacy is a positive number.
+    fn check_illuminance(&self) -> Result<(), RenderError> {
+        let Picture { layers, lumens_per_watt, .. } = &self.picture;
+        if let Some(lumens) = lumens_per_watt.filter(|lumens| !(lumens.is_finite() && *lumens > 0.0)) {
+            return Err(RenderError::Setting {
+                field: "picture.lumens_per_watt",
+                value: lumens.to_string(),
+                reason: "an efficacy is a positive number of lumens per watt".into(),
+                remedy: "give 683, 179 for radiances of Radiance, or 1 for light in candela and lux".into(),
+            });
+        }
+        if !layers.have_illuminance() || self.schedule.part.is_none() {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            field: "picture.layers",
+            value: layers.to_string(),
+            reason: "illuminance is a frame of its own, which a part of a picture does not have".into(),
+            remedy:
+                "leave illuminance out, and render the parts of a second picture with `picture.irradiance`"
+                    .into(),
+        })
+    }
+
+    /// Checks that a chip has room for the irradiance records of a pixel, one for each light group.
+    fn check_records_of_light_groups(&self, budget: &Budget) -> Result<(), RenderError> {
+        let groups = &self.picture.light_groups;
+        let most = budget.irradiance_records as usize / MIN_RECORDS;
+        if self.integrator.irradiance_error.is_none() || groups.len() <= most {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            field: "picture.light_groups",
+            value: groups.join(","),
+            reason: format!("this card has room for the irradiance records of {most} light groups"),
+            remedy: "use fewer groups, render without `integrator.irradiance_error`, or use another card"
+                .into(),
+        })
+    }
+
+    /// Checks that the light groups are those of the scene.
+    ///
+    /// # Errors
+    /// If [`Scene::set_light_groups`] has set others.
+    pub(crate) fn check_groups_of(&self, scene: &Scene) -> Result<(), RenderError> {
+        let names = scene.light_groups.names();
+        if self.picture.light_groups == names {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            field: "picture.light_groups",
+            value: self.picture.light_groups.join(","),
+            reason: format!("the scene has the light groups [{}]", names.join(", ")),
+            remedy: "state the names of the scene's light groups, or none of both".into(),
         })
     }
 
@@ -153,10 +239,22 @@ impl RenderSettings {
 
     /// Checks that the tile fits into the chip with the sums of all layers that chips render.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
-        let most = budget.pixels_of_tile(self.picture.layers.separate_light()).isqrt();
+        let most = budget.pixels_of_tile(self.picture.form().sums_of_light()).isqrt();
         let side = self.schedule.tile.unwrap_or(1);
         if side <= most {
             return Ok(());
+        }
+        let groups = &self.picture.light_groups;
+        if !groups.is_empty() && !self.picture.layers.separate_light() {
+            return Err(RenderError::Setting {
+                field: if most == 0 { "picture.light_groups" } else { "schedule.tile" },
+                value: if most == 0 { groups.join(",") } else { side.to_string() },
+                reason: format!(
+                    "with {} light groups a tile may have {most} pixels a side on this card",
+                    groups.len()
+                ),
+                remedy: "choose a smaller `schedule.tile`, or fewer `picture.light_groups`".into(),
+            });
         }
         let leave_out = "leave direct, indirect, caustic and gathers out of `picture.layers`: with them a chip keeps four sums \
                          a pixel";

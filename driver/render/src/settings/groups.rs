@@ -10,7 +10,7 @@ use photoncard_picture::layer::Layers;
 use photoncard_scene::Aperture;
 use photoncard_shared::message::{Filter, PixelForm, Radiance, Sampling};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use super::setting::Changes::{Cards, Nothing, Pixels, Work};
 use super::setting::{Setting, UNSTATED, list, name, optional, place, setting, value};
@@ -55,18 +55,30 @@ pub struct Picture {
     pub focus: Option<f32>,
     /// Layers of the picture in addition to radiance.
     pub layers: Layers,
+    /// Names of the light groups whose light the picture separates: those of the scene
+    /// ([`LightGroups`](photoncard_scene::LightGroups)), or none.
+    pub light_groups: Vec<String>,
     /// Pixel filter.
     pub filter: Filter,
     /// True if the environment is black where eye rays see it directly. Files then have alpha, and radiance
     /// is premultiplied.
     pub transparent: bool,
+    /// True if the picture shows irradiance, W/m^2, of the first surfaces that the eye rays meet, in place of
+    /// radiance.
+    pub irradiance: bool,
+    /// Luminous efficacy of the layer of illuminance, lm/W; `None` for [`Scene::lumens_per_watt`].
+    ///
+    /// [`Scene::lumens_per_watt`]: photoncard_scene::Scene::lumens_per_watt
+    pub lumens_per_watt: Option<f32>,
 }
 
 impl Picture {
     /// Optional contents of pixels that the picture's files need.
     pub fn form(&self) -> PixelForm {
         let form = self.layers.form();
-        PixelForm { coverage: form.coverage || self.transparent, ..form }
+        // There are at most four groups.
+        let light_groups = self.light_groups.len() as u8;
+        PixelForm { coverage: form.coverage || self.transparent, light_groups, ..form }
     }
 
     /// Window of the picture that is rendered.
@@ -78,6 +90,14 @@ impl Picture {
     /// the scene file.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
+    }
+
+    /// Settings of all layers of the picture's files, by option. The identity of a picture has only the
+    /// layers that chips send on request.
+    pub fn of_layers(&self) -> Map<String, Value> {
+        let lumens = self.lumens_per_watt.filter(|_| self.layers.have_illuminance());
+        let lumens = lumens.map(|lumens| ("lumens-per-watt".to_owned(), json!(lumens)));
+        [("aov".to_owned(), json!(self.layers.to_string()))].into_iter().chain(lumens).collect()
     }
 
     pub(super) fn options(&self) -> Vec<Setting> {
@@ -95,17 +115,21 @@ impl Picture {
             aperture,
             focus,
             layers,
+            light_groups,
             filter,
             transparent,
+            irradiance,
+            lumens_per_watt,
         } = self;
         let pair = |numbers: Option<[f32; 2]>| (Some(json!(numbers)), numbers.map(|numbers| list(&numbers)));
         let aperture = aperture.map(|aperture| aperture.to_string());
         let size = (Some(json!([width, height])), Some(format!("{width}x{height}")));
         let Window { x0, x1, y0, y1 } = self.window();
         let window = [x0, x1, y0, y1];
-        // The identity of a picture has only the layers that chips send on request.
         // A picture with a background has the provenance that it had before there was a choice.
-        let transparent = if *transparent { (Some(json!(true)), Some(String::new())) } else { UNSTATED };
+        let switch = |is_on: &bool| if *is_on { (Some(json!(true)), Some(String::new())) } else { UNSTATED };
+        // The scene's sources of the groups are part of its checksum; the options are those of the scene.
+        let groups = (!light_groups.is_empty()).then(|| json!(light_groups));
         let aov = (Some(json!(layers.of_chip().to_string())), Some(layers.to_string()));
         vec![
             setting(Pixels, "picture.width", "size", size),
@@ -121,8 +145,11 @@ impl Picture {
             setting(Pixels, "picture.aperture", "aperture", optional(aperture)),
             setting(Pixels, "picture.focus", "focus", optional(*focus)),
             setting(Pixels, "picture.layers", "aov", aov),
+            setting(Pixels, "picture.light_groups", "light-groups", (groups, None)),
             setting(Pixels, "picture.filter", "filter", name(*filter)),
-            setting(Pixels, "picture.transparent", "transparent", transparent),
+            setting(Pixels, "picture.transparent", "transparent", switch(transparent)),
+            setting(Pixels, "picture.irradiance", "irradiance", switch(irradiance)),
+            setting(Nothing, "picture.lumens_per_watt", "lumens-per-watt", optional(*lumens_per_watt)),
         ]
     }
 }
@@ -143,8 +170,11 @@ impl Default for Picture {
             aperture: None,
             focus: None,
             layers: Layers::default(),
+            light_groups: Vec::new(),
             filter: Filter::Box,
             transparent: false,
+            irradiance: false,
+            lumens_per_watt: None,
         }
     }
 }

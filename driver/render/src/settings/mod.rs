@@ -75,7 +75,7 @@ impl RenderSettings {
         if let Some(side) = self.schedule.tile {
             return side;
         }
-        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.separate_light()));
+        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.form().sums_of_light()));
         let widest = room.min().unwrap_or(NARROWEST_TILE.pow(2)).isqrt().max(1);
         let window = self.window();
         let wanted = if budgets.len() > 1 { TILES_OF_CARD * budgets.len() as u64 } else { 1 };
@@ -106,7 +106,9 @@ impl RenderSettings {
         let form = self.picture.form();
         let Integrator { samples, adaptive_threshold, .. } = self.integrator;
         let format = SumFormat::of_range(form, (0, samples), adaptive_threshold.is_some(), scale);
-        Film::new(self.picture.width, self.picture.height, self.window(), format)
+        let mut film = Film::new(self.picture.width, self.picture.height, self.window(), format)?;
+        film.set_light_groups(&self.picture.light_groups);
+        Ok(film)
     }
 
     /// Caches of the memory model; `None` if memory is not modelled.
@@ -184,7 +186,7 @@ impl RenderSettings {
         max_distance: f32,
         caustics: Option<CausticGather>,
     ) -> FrameParameters {
-        let PixelForm { layers, position, coverage, identities } = self.picture.form();
+        let PixelForm { layers, light_groups, position, coverage, identities } = self.picture.form();
         FrameParameters {
             width: self.picture.width,
             height: self.picture.height,
@@ -205,6 +207,7 @@ impl RenderSettings {
             radiance: self.photons.radiance,
             caustics,
             layers,
+            light_groups,
             filter: self.picture.filter,
             in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
             keep_records: self.keeps_records(),
@@ -213,6 +216,7 @@ impl RenderSettings {
             position,
             coverage,
             identities,
+            irradiance: self.picture.irradiance,
         }
     }
 }

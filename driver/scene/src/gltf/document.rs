@@ -46,6 +46,8 @@ pub(super) struct Document {
     pub(super) unknown_paths: Vec<UnknownPath>,
     /// Files in the scene's folder that were read.
     pub(super) files: Files,
+    /// True if `TEXCOORD_1` is read where no texture takes it.
+    pub(super) has_lightmaps: bool,
 }
 
 impl Document {
@@ -78,8 +80,18 @@ impl Document {
         };
         shortened.by_extensions.extend(removed.iter().filter_map(of_extensions));
         let (path, conversions, files) = (path.to_owned(), Conversions::default(), Files::default());
-        let mut document =
-            Self { path, root, bytes, text, blob, conversions, shortened, unknown_paths, files };
+        let mut document = Self {
+            path,
+            root,
+            bytes,
+            text,
+            blob,
+            conversions,
+            shortened,
+            unknown_paths,
+            files,
+            has_lightmaps: false,
+        };
         document.check()?;
         document.conversions = specular_glossiness::convert(&mut document.root);
         Ok(document)

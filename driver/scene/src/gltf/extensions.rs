@@ -1,6 +1,7 @@
 //! glTF extensions that the loader supports.
 
-pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
+pub(super) const SUPPORTED_EXTENSIONS: [&str; 21] = [
+    IES,
     INSTANCING,
     WEBP,
     BASISU,
@@ -26,6 +27,9 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
 
 /// Extension for integer vertex attributes.
 pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
+
+/// Extension for lights with photometric files.
+pub(super) const IES: &str = "EXT_lights_ies";
 
 /// Extension for instances of a node's mesh.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";

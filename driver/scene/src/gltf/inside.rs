@@ -61,7 +61,9 @@ fn lamps(scene: &Scene) -> Vec<Lamp> {
     let mut lamps = Vec::new();
     for light in &scene.lights {
         match light.kind {
-            PunctualKind::Point { position } | PunctualKind::Spot { position, .. } => {
+            PunctualKind::Point { position }
+            | PunctualKind::Spot { position, .. }
+            | PunctualKind::Profile { position, .. } => {
                 lamps.push((light.intensity.max_element(), (position, None)));
             }
             PunctualKind::Directional { .. } => {}

@@ -3,12 +3,15 @@
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light, Spot, Type};
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 
 use super::document::Document;
+use super::extras;
 use super::notices::Notices;
 use crate::error::SceneError;
+use crate::light::DISK_DEGREES;
 use crate::limits::EMISSION;
-use crate::{LightUnits, PunctualKind, PunctualLight, Scene, blender};
+use crate::{LightAxes, LightUnits, PunctualKind, PunctualLight, Scene, blender};
 
 /// Minimum difference between the cosines of a spot light's cones, as `KHR_lights_punctual` recommends.
 /// Exporters write equal angles for a sharp edge.
@@ -35,6 +38,11 @@ impl<'a> LightPlacer<'a> {
         Self { document, units: found.unwrap_or(units), found }
     }
 
+    /// Returns true if light of the file is in watts, of lights that are converted to them.
+    pub(super) fn are_in_watts(&self) -> bool {
+        self.units.are_converted()
+    }
+
     /// Adds the light `index`, which exists, with the transform of `node`.
     pub(super) fn place(
         &self,
@@ -59,7 +67,8 @@ impl<'a> LightPlacer<'a> {
             notices.blender_spots.extend(has_penumbra.then(|| name.clone()));
         }
         let kind = self.kind(index, node, world)?;
-        scene.lights.push(PunctualLight { name, kind, intensity });
+        let axes = axes(world).unwrap_or_default();
+        scene.lights.push(PunctualLight { name, kind, intensity, axes });
         Ok(())
     }
 
@@ -94,7 +103,8 @@ impl<'a> LightPlacer<'a> {
         }
         Ok(match light.type_ {
             Checked::Valid(Type::Directional) => {
-                PunctualKind::Directional { direction: direction.ok_or_else(misplaced)? }
+                let angle = self.angle(index)?;
+                PunctualKind::Directional { direction: direction.ok_or_else(misplaced)?, angle }
             }
             Checked::Valid(Type::Spot) => {
                 let (inner_cosine, outer_cosine) = self.cones(light);
@@ -104,6 +114,22 @@ impl<'a> LightPlacer<'a> {
             // Validation has rejected other types.
             Checked::Valid(Type::Point) | Checked::Invalid => PunctualKind::Point { position },
         })
+    }
+
+    /// Angle across the disk of a directional light, radians: `extras.photoncard.angle`, degrees.
+    fn angle(&self, index: usize) -> Result<f32, SceneError> {
+        let invalid = |reason: String| {
+            let place = format!("{}.extras.photoncard", place(index));
+            let remedy =
+                "state {\"photoncard\": {\"angle\": A}} with the degrees across the light's disk, 0 to 180";
+            self.document.invalid(place, reason, remedy)
+        };
+        let stated: Option<Stated> = extras::read(&self.document.lights()[index].extras).map_err(invalid)?;
+        let degrees = stated.and_then(|stated| stated.angle).unwrap_or_default();
+        if !DISK_DEGREES.contains(&degrees) {
+            return Err(invalid(format!("the angle is {degrees}")));
+        }
+        Ok(degrees.to_radians())
     }
 
     /// Cosines of the inner and the outer cone angle of a spot light.
@@ -117,6 +143,19 @@ impl<'a> LightPlacer<'a> {
         };
         (inner_cosine, outer_cosine.min(inner_cosine - MIN_PENUMBRA))
     }
+}
+
+/// Axes of a light with the transform of its node; `None` if the transform has no direction.
+pub(super) fn axes(world: &DMat4) -> Option<LightAxes> {
+    let aim = (-world.z_axis.truncate()).try_normalize()?;
+    let across = world.x_axis.truncate().reject_from_normalized(aim).try_normalize()?;
+    Some(LightAxes { aim: aim.as_vec3(), across: across.as_vec3() })
+}
+
+/// Values of this renderer in a light's `extras`.
+#[derive(Deserialize)]
+struct Stated {
+    angle: Option<f32>,
 }
 
 /// Cone of a light, if it is a spot light.

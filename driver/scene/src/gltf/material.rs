@@ -11,6 +11,7 @@ use super::extras;
 use super::layers::{self, has_other_layer};
 use super::texture::{Textures, Use};
 use crate::error::SceneError;
+use crate::light_groups::LightSource;
 use crate::out_of_range::{OutOfRange, Property};
 use crate::{Material, Reflection, Transmission};
 
@@ -18,6 +19,11 @@ use crate::{Material, Reflection, Transmission};
 #[serde(deny_unknown_fields)]
 struct Photoncard {
     phong: Option<Phong>,
+    /// Light group of the emission.
+    light_group: Option<String>,
+    /// Lightmap that `photoncard bake` has written, for other programs.
+    #[serde(default, rename = "lightmap")]
+    _lightmap: Option<serde::de::IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -48,14 +54,15 @@ fn load_one(
     let [red, green, blue, alpha] = source.pbr_metallic_roughness.base_color_factor.0;
     let extensions = source.extensions.as_ref();
     let base_colour = Vec3::new(red, green, blue);
-    let reflection = if let Some(phong) = read_phong(document, index, source, &name)? {
-        let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
-        Reflection::Phong { diffuse: base_colour, specular, exponent }
-    } else if is_lambertian(source) {
-        Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
-    } else {
-        metallic_roughness(source, base_colour)
-    };
+    let reflection =
+        if let Some(phong) = photoncard(document, index, source, &name)?.and_then(|stated| stated.phong) {
+            let (specular, exponent) = (Vec3::from(phong.specular), phong.exponent);
+            Reflection::Phong { diffuse: base_colour, specular, exponent }
+        } else if is_lambertian(source) {
+            Reflection::Phong { diffuse: base_colour, specular: Vec3::ZERO, exponent: 0.0 }
+        } else {
+            metallic_roughness(source, base_colour)
+        };
     let mut material = Material {
         emission: emission(source),
         double_sided: source.double_sided,
@@ -223,18 +230,30 @@ fn transmission(extensions: Option<&json::extensions::material::Material>, ior: 
     (factor != 0.0).then_some(Transmission { factor, ior, is_volume: volume.is_some(), absorption })
 }
 
-fn read_phong(
+/// Light groups that materials state.
+///
+/// # Errors
+/// If the `extras` of a material are not possible.
+pub(super) fn light_groups(document: &Document) -> Result<Vec<(LightSource, String)>, SceneError> {
+    let mut groups = Vec::new();
+    for (index, source) in document.root.materials.iter().enumerate() {
+        let name = source.name.as_deref().unwrap_or_default();
+        let stated = photoncard(document, index, source, name)?.and_then(|stated| stated.light_group);
+        groups.extend(stated.map(|group| (LightSource::Material(index), group)));
+    }
+    Ok(groups)
+}
+
+fn photoncard(
     document: &Document,
     index: usize,
     source: &json::Material,
     name: &str,
-) -> Result<Option<Phong>, SceneError> {
-    let photoncard: Option<Photoncard> =
-        extras::read(&source.extras).map_err(|reason| SceneError::Material {
-            location: document.location(format!("materials[{index}].extras.photoncard")),
-            material: name.to_owned(),
-            reason,
-            remedy: r#"state it as {"photoncard": {"phong": {"specular": [r, g, b], "exponent": n}}}"#,
-        })?;
-    Ok(photoncard.and_then(|photoncard| photoncard.phong))
+) -> Result<Option<Photoncard>, SceneError> {
+    extras::read(&source.extras).map_err(|reason| SceneError::Material {
+        location: document.location(format!("materials[{index}].extras.photoncard")),
+        material: name.to_owned(),
+        reason,
+        remedy: r#"state some of {"photoncard": {"phong": {"specular": [r, g, b], "exponent": n}, "light_group": "key"}}"#,
+    })
 }

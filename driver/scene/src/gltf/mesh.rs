@@ -5,6 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use glam::{DMat4, DVec3, Vec3};
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::Checked;
 use photoncard_picture::allocation;
 
 use super::accessor::Source;
@@ -312,6 +314,8 @@ impl<'a> MeshPlacer<'a> {
             for texture in scene.materials[material].textures() {
                 used_sets[scene.textures[texture as usize].set as usize] = true;
             }
+            let lightmap = primitive.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(1)));
+            used_sets[1] |= self.source.document.has_lightmaps && lightmap;
             let tangent_texture = scene.materials[material].tangent_texture();
             let tangent_set = tangent_texture.map(|texture| scene.textures[texture as usize].set as usize);
             let sets = (used_sets, tangent_set);

@@ -36,6 +36,7 @@ mod origin;
 mod other_kinds;
 mod pose;
 mod primitive;
+mod profiles;
 mod room;
 mod scene_file;
 mod schema;

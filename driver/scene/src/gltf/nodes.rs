@@ -4,22 +4,26 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use glam::DMat4;
+use serde::Deserialize;
 
 use super::accessor::Source;
 use super::animation::Poses;
 use super::camera::CameraPlacer;
 use super::document::Document;
 use super::extent::Anchor;
+use super::extras;
 use super::instances::Instances;
 use super::light::LightPlacer;
 use super::mesh::MeshPlacer;
 use super::names::object_name;
 use super::notices::Notices;
 use super::pose::Pose;
+use super::profiles::Profiles;
 use super::room::Room;
 use super::skin::Skin;
 use super::transform;
 use crate::error::SceneError;
+use crate::light_groups::LightSource;
 use crate::{Camera, LightUnits, Scene};
 
 /// Maximum depth of the node hierarchy.
@@ -47,9 +51,11 @@ pub(super) fn place(
         meshes: MeshPlacer::new(source),
         cameras: CameraPlacer::new(document),
         lights: LightPlacer::new(document, units),
+        profiles: Profiles::new(source),
         skins: BTreeMap::new(),
         worlds: Vec::new(),
     };
+    scene.is_in_watts = placer.lights.are_in_watts();
     nodes.iter().try_for_each(|(index, world)| placer.count(*index, world, scene))?;
     placer.meshes.choose_groups(scene);
     placer.meshes.check_room(room)?;
@@ -79,12 +85,28 @@ pub(super) fn cameras(
     Ok(std::mem::take(&mut scene.cameras))
 }
 
+/// Properties of a node under the key `photoncard` of its `extras`. Others are ignored: an object of Blender
+/// may have those of its camera.
+#[derive(Default, Deserialize)]
+struct Extras {
+    /// Light group of the node's light, and of the emission of its mesh.
+    light_group: Option<String>,
+    /// Photometric file of the node's light: a path beside the scene, or a data URI.
+    ies: Option<String>,
+}
+
+/// A source with the light group that is stated for it, if any.
+fn of_group(stated: &Option<String>, source: LightSource) -> Option<(LightSource, String)> {
+    Some((source, stated.clone()?))
+}
+
 struct Placer<'a> {
     source: &'a Source<'a>,
     poses: &'a Poses,
     meshes: MeshPlacer<'a>,
     cameras: CameraPlacer<'a>,
     lights: LightPlacer<'a>,
+    profiles: Profiles<'a>,
     skins: BTreeMap<usize, Skin>,
     /// World transform of every node; `None` for nodes outside the scene.
     worlds: Vec<Option<DMat4>>,
@@ -133,7 +155,10 @@ impl<'a> Placer<'a> {
     ) -> Result<(), SceneError> {
         let document = self.source.document;
         let node = &document.root.nodes[index];
+        let Extras { light_group: stated, ies } = self.extras(index)?;
         if let Some(mesh) = node.mesh {
+            let object = LightSource::Object(scene.objects.len());
+            scene.stated_light_groups.extend(of_group(&stated, object));
             scene.objects.push(object_name(&document.root, index));
             let weights = self.weights(index, mesh.value());
             match node.skin {
@@ -144,11 +169,29 @@ impl<'a> Placer<'a> {
         if let Some(camera) = node.camera {
             self.cameras.place(camera.value(), index, &world, scene)?;
         }
+        let lights = scene.lights.len();
         let extensions = node.extensions.as_ref();
         if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {
             self.lights.place(light.light.value(), index, &world, scene, notices)?;
+            // A spot light without an angle is left out.
+            if let Some(uri) = ies.filter(|_| scene.lights.len() > lights) {
+                self.profiles.assign((&uri, index), lights, scene)?;
+            }
         }
+        self.profiles.place(index, &world, scene)?;
+        let added = (lights..scene.lights.len()).map(LightSource::Light);
+        scene.stated_light_groups.extend(added.filter_map(|light| of_group(&stated, light)));
         Ok(())
+    }
+
+    /// Light group and photometric file that a node states in its `extras`.
+    fn extras(&self, index: usize) -> Result<Extras, SceneError> {
+        let document = self.source.document;
+        let stated = extras::read(&document.root.nodes[index].extras).map_err(|reason| {
+            let remedy = r#"state texts, such as {"photoncard": {"light_group": "key", "ies": "lamp.ies"}}"#;
+            document.invalid(format!("nodes[{index}].extras.photoncard"), reason, remedy)
+        })?;
+        Ok(stated.unwrap_or_default())
     }
 
     /// Weights of the morph targets of a node's mesh: those of the pose, else of the node, else of the mesh.

@@ -16,7 +16,7 @@ use super::notices::{self, Notices, Sentences};
 use super::room::Room;
 use super::settings::LoadSettings;
 use super::texture::Textures;
-use super::{camera, material, nodes, solid_glass, touching_glass, variants};
+use super::{camera, material, nodes, profiles, solid_glass, touching_glass, variants};
 use crate::error::SceneError;
 use crate::{Camera, LightUnits, MAX_SIDE, Scene, SceneContents};
 
@@ -61,8 +61,9 @@ impl SceneFile {
     /// images exceed the cards' memory; or if it lacks the variant of `settings`. The error names the
     /// location in the file and the remedy.
     pub fn open(path: &Path, settings: &LoadSettings) -> Result<Self, SceneError> {
-        let LoadSettings { dram_bytes, texture_limit, variant, light_units } = settings;
+        let LoadSettings { dram_bytes, texture_limit, variant, light_units, lightmap_coordinates } = settings;
         let mut document = Document::read(path)?;
+        document.has_lightmaps = *lightmap_coordinates;
         variant.as_deref().map_or(Ok(()), |name| variants::select(&mut document, name))?;
         let mut room = Room::new(path, *dram_bytes, texture_limit.unwrap_or(MAX_SIDE));
         room.materials(document.root.materials.len())?;
@@ -164,7 +165,8 @@ impl SceneFile {
             }
             let node = &root.nodes[index];
             let extensions = node.extensions.as_ref();
-            let has_light = extensions.is_some_and(|extensions| extensions.khr_lights_punctual.is_some());
+            let has_light = extensions.is_some_and(|extensions| extensions.khr_lights_punctual.is_some())
+                || profiles::of_node(node).is_some();
             if node.mesh.is_some() || has_light || is_joint(index) {
                 return false;
             }
@@ -220,9 +222,11 @@ fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String
     let source = Source::new(document, &buffers);
     let mut textures = Textures::new(document);
     let materials = material::load(document, &mut textures)?;
+    let stated_light_groups = material::light_groups(document)?;
     let generator = document.root.asset.generator.clone();
     let mut scene = Scene::from(SceneContents {
         materials,
+        stated_light_groups,
         variants: variants::names(document),
         generator,
         ..SceneContents::default()

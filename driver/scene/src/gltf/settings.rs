@@ -17,6 +17,8 @@ pub struct LoadSettings {
     pub variant: Option<String>,
     /// Units of the file's punctual lights.
     pub light_units: LightUnits,
+    /// True to read `TEXCOORD_1` also where no texture takes it: lightmaps do.
+    pub lightmap_coordinates: bool,
 }
 
 /// Default settings: memory of the reference chip, images of all sizes, no variant, and units chosen by the
@@ -28,6 +30,7 @@ impl Default for LoadSettings {
             texture_limit: None,
             variant: None,
             light_units: LightUnits::default(),
+            lightmap_coordinates: false,
         }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
+use crate::light::DISK_DEGREES;
 use crate::limits::{BRIGHTEST, EMISSION};
 use crate::out_of_range::every;
 use crate::{Environment, PunctualKind, PunctualLight};
@@ -17,14 +18,19 @@ pub(super) enum LightProperty {
     Colour,
     Intensity,
     Position,
+    Angle,
 }
 
 /// Range of a light's coordinates relative to the scene's origin, metres.
 const PLACES: RangeInclusive<f32> = -1e15..=1e15;
 
 impl LightProperty {
-    pub(super) const ALL: [(&str, Self); 3] =
-        [("colour", Self::Colour), ("intensity", Self::Intensity), ("position", Self::Position)];
+    pub(super) const ALL: [(&str, Self); 4] = [
+        ("colour", Self::Colour),
+        ("intensity", Self::Intensity),
+        ("position", Self::Position),
+        ("angle", Self::Angle),
+    ];
 }
 
 impl PunctualLight {
@@ -62,7 +68,31 @@ impl PunctualLight {
                     "write X,Y,Z in metres, such as bulb.position=0,2,1",
                 ));
             }
+            (LightProperty::Angle, _) => self.spread_over(values)?,
         }
+        Ok(())
+    }
+
+    fn spread_over(&mut self, values: &[f32]) -> Result<(), Refusal> {
+        let &[degrees] = values else {
+            return Err((
+                "the angle is one number",
+                "write the degrees across the disk, such as sun.angle=0.53",
+            ));
+        };
+        let PunctualKind::Directional { angle, .. } = &mut self.kind else {
+            return Err((
+                "the light is no directional one, and its position is a point",
+                "set the angle of a directional light; make soft shadows of a lamp by an emissive surface",
+            ));
+        };
+        if !DISK_DEGREES.contains(&degrees) {
+            return Err((
+                "no disk has this angle",
+                "the angle across a disk is 0 to 180 degrees, such as 0.53",
+            ));
+        }
+        *angle = degrees.to_radians();
         Ok(())
     }
 
@@ -74,7 +104,9 @@ impl PunctualLight {
             ));
         }
         match &mut self.kind {
-            PunctualKind::Point { position } | PunctualKind::Spot { position, .. } => *position = place,
+            PunctualKind::Point { position }
+            | PunctualKind::Spot { position, .. }
+            | PunctualKind::Profile { position, .. } => *position = place,
             PunctualKind::Directional { .. } => {
                 return Err((
                     "the light is a directional one, which comes from infinitely far and has no position",

@@ -1,24 +1,28 @@
 //! Assignments from the command line that replace a value of a material or a light: `floor.exponent=32`.
 
 mod light;
+mod light_groups;
 mod material;
-mod nearest;
 #[cfg(test)]
 mod tests;
 
+use std::path::Path;
 use std::str::FromStr;
 
 use glam::DVec3;
 
 use self::light::LightProperty;
 use self::material::MaterialProperty;
-use self::nearest::nearest;
-use super::{PunctualLight, Scene};
+use super::{LightProfile, PunctualLight, Scene};
 use crate::error::SceneError;
+use crate::nearest::nearest;
 
 const FORM: &str = "write NAME.PROPERTY=VALUE, for example floor.exponent=32 or lamp.emission=18,14,7; the properties of a \
                     material are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and \
-                    emission; those of a light are colour, intensity and position; and there is environment.strength";
+                    emission; those of a light are colour, intensity, position, angle and ies; and there is environment.strength";
+
+/// Text between the name of a light and the path of its photometric file.
+const PROFILE: &str = ".ies=";
 
 /// Name of the environment in an assignment.
 const ENVIRONMENT: &str = "environment";
@@ -73,6 +77,11 @@ fn fault(assignment: &str, reason: String, remedy: &'static str) -> SceneError {
     SceneError::Setting { assignment: assignment.to_owned(), reason, remedy }
 }
 
+/// Photometric file that an assignment names, as `LIGHT.ies=FILE` does.
+pub fn profile_of(assignment: &str) -> Option<&Path> {
+    assignment.split_once(PROFILE).map(|(_, file)| Path::new(file.trim()))
+}
+
 impl Scene {
     /// Applies one assignment: `MATERIAL.PROPERTY=VALUE` to all materials of the name, `LIGHT.PROPERTY=VALUE`
     /// to all point, spot and directional lights of the name, or `environment.strength=VALUE`.
@@ -85,11 +94,15 @@ impl Scene {
     /// number for all three channels; other values are one number. Textures still multiply the values. The
     /// emissive texture of a material that did not emit was not loaded; a notice says so.
     ///
-    /// Properties of a light are `colour`, `intensity` and `position`. Only the ratios of the colour's
-    /// channels count. The intensity is that of the greatest channel: W/sr, or W/m^2 of a directional light.
-    /// Setting it keeps the colour; a light of intensity 0 counts as white. The position is `x,y,z` in the
-    /// file's coordinates, metres; only a point or spot light with a unique name has one. The strength of the
-    /// environment is a factor of its texels.
+    /// Properties of a light are `colour`, `intensity`, `position` and `angle`. Only the ratios of the
+    /// colour's channels count. The intensity is that of the greatest channel: W/sr, or W/m^2 of a
+    /// directional light. Setting it keeps the colour; a light of intensity 0 counts as white. The position
+    /// is `x,y,z` in the file's coordinates, metres; only a point or spot light with a unique name has one.
+    /// The angle is that across the disk of a directional light, degrees. The strength of the environment is
+    /// a factor of its texels.
+    ///
+    /// `LIGHT.ies=FILE` gives a point or spot light the intensities of a [`LightProfile`] about its axes. The
+    /// light keeps its hue and has the file's luminous flux.
     ///
     /// Materials and lights have no property in common, so that a material and a light may have the same
     /// name. A name may itself contain dots. [`Scene::check_light`] checks that the scene still has a light
@@ -99,6 +112,17 @@ impl Scene {
     /// If the text is not of this form, the scene has no material, light or environment of the name, it lacks
     /// the property, or a value would be out of range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
+        if let (Some((name, _)), Some(file)) = (assignment.split_once(PROFILE), profile_of(assignment)) {
+            return self.apply_profile(assignment, name, file);
+        }
+        self.assign(assignment)
+    }
+
+    /// Does what [`Self::apply`] does, but reads no file: for assignments of strangers.
+    ///
+    /// # Errors
+    /// As [`Self::apply`], and for `LIGHT.ies=FILE`.
+    pub fn assign(&mut self, assignment: &str) -> Result<(), SceneError> {
         let assignment = Assignment::parse(assignment)?;
         match assignment.property {
             Property::Material(property) => self.apply_to_materials(&assignment, property),
@@ -133,7 +157,7 @@ impl Scene {
     fn no_material(&self, assignment: &Assignment) -> SceneError {
         let name = assignment.name;
         if self.lights.iter().any(|light| light.name == name) {
-            let reason = format!("'{name}' is a light, which has colour, intensity and position");
+            let reason = format!("'{name}' is a light, which has colour, intensity, position, angle and ies");
             return assignment.fault(reason, "set one of these, or the property of a material");
         }
         SceneError::UnknownMaterial {
@@ -153,7 +177,7 @@ impl Scene {
         let mut selected: Vec<&mut PunctualLight> =
             changed.iter_mut().filter(|light| light.name == name).collect();
         match selected.len() {
-            0 => return Err(self.no_light(assignment)),
+            0 => return Err(self.no_light(assignment.text, name)),
             1 => {}
             count if property == LightProperty::Position => {
                 let reason = format!("{count} lights have the name '{name}', and would be in one place");
@@ -173,8 +197,24 @@ impl Scene {
         Ok(())
     }
 
-    fn no_light(&self, assignment: &Assignment) -> SceneError {
-        let name = assignment.name;
+    fn apply_profile(&mut self, text: &str, name: &str, file: &Path) -> Result<(), SceneError> {
+        let indices = 0..self.lights.len();
+        let selected: Vec<usize> = indices.filter(|&index| self.lights[index].name == name).collect();
+        if selected.is_empty() {
+            return Err(self.no_light(text, name));
+        }
+        let profile = LightProfile::load(file)?;
+        let before = self.lights.clone();
+        for index in selected {
+            if let Err((reason, remedy)) = self.set_profile(index, &profile) {
+                self.lights = before;
+                return Err(fault(text, reason.to_owned(), remedy));
+            }
+        }
+        Ok(())
+    }
+
+    fn no_light(&self, text: &str, name: &str) -> SceneError {
         let reason = if self.materials.iter().any(|material| material.name == name) {
             format!("'{name}' is a material, and no point, spot or directional light")
         } else if self.lights.is_empty() {
@@ -183,7 +223,7 @@ impl Scene {
             let names = nearest(name, self.lights.iter().map(|light| light.name.as_str()));
             format!("there is no light '{name}'; there are {names}")
         };
-        assignment.fault(reason, "set a light by its name, or the emission of a material")
+        fault(text, reason, "set a light by its name, or the emission of a material")
     }
 
     fn apply_to_environment(&mut self, assignment: &Assignment) -> Result<(), SceneError> {

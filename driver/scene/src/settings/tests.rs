@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use crate::error::SceneError;
 use crate::{
-    Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, SceneContents, Transmission,
+    Environment, LightAxes, Material, PunctualKind, PunctualLight, Reflection, Scene, SceneContents,
+    Transmission,
 };
 
 fn scene() -> Scene {
@@ -152,12 +153,16 @@ fn materials_of_one_name_change_together() {
 }
 
 fn lit() -> Scene {
-    let at =
-        |name: &str, kind| PunctualLight { name: name.into(), kind, intensity: Vec3::new(2.0, 4.0, 1.0) };
+    let at = |name: &str, kind| PunctualLight {
+        name: name.into(),
+        kind,
+        intensity: Vec3::new(2.0, 4.0, 1.0),
+        axes: LightAxes::default(),
+    };
     let position = Vec3::ONE;
     let lights = vec![
         at("bulb", PunctualKind::Point { position }),
-        at("sun", PunctualKind::Directional { direction: Vec3::NEG_Y }),
+        at("sun", PunctualKind::Directional { direction: Vec3::NEG_Y, angle: 0.0 }),
         at("pair", PunctualKind::Point { position }),
         at("pair", PunctualKind::Point { position }),
     ];
@@ -189,6 +194,18 @@ fn a_light_with_a_place_is_moved() {
 }
 
 #[test]
+fn a_directional_light_comes_from_a_disk_of_an_angle() {
+    let mut scene = lit();
+    let before = scene.checksum().to_owned();
+    scene.apply("sun.angle=90").unwrap();
+    let kind = PunctualKind::Directional { direction: Vec3::NEG_Y, angle: std::f32::consts::FRAC_PI_2 };
+    assert_eq!(scene.lights[1].kind, kind);
+    assert_ne!(scene.checksum(), before);
+    scene.apply("sun.angle=0").unwrap();
+    assert_eq!(scene.checksum(), before);
+}
+
+#[test]
 fn the_strength_of_the_environment_is_replaced() {
     let mut scene = lit();
     let before = scene.checksum().to_owned();
@@ -215,6 +232,10 @@ fn bad_settings_of_lights_are_refused_with_a_remedy() {
         ("bulb.position=1", "three numbers"),
         ("bulb.position=1,2,nan", "position"),
         ("sun.position=1,2,3", "directional"),
+        ("sun.angle=1,2,3", "one number"),
+        ("sun.angle=181", "0 to 180"),
+        ("sun.angle=nan", "0 to 180"),
+        ("bulb.angle=1", "no directional"),
         ("pair.position=1,2,3", "2 lights"),
         ("lamp.intensity=1", "'bulb'"),
         ("floor.intensity=1", "'floor' is a material"),

@@ -13,6 +13,7 @@ mod ktx2;
 mod layers;
 mod loading;
 mod materials;
+mod profiles;
 mod schema;
 mod specular_glossiness;
 mod support;

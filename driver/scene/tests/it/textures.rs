@@ -503,3 +503,22 @@ fn normals_and_data_keep_sixteen_bits() {
         assert_eq!(loaded(&["metallicRoughnessTexture", both]).0, Encoding::Linear);
     }
 }
+
+#[test]
+fn coordinates_of_lightmaps_are_read_on_request() {
+    let mut scene = crate::support::Extended::new();
+    let corners = [[0.25, 0.5], [0.75, 0.5], [0.25, 0.75]];
+    let second = scene.floats("VEC2", &corners);
+    scene.primitive()["attributes"]["TEXCOORD_1"] = json!(second);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("data.bin"), &scene.bytes).unwrap();
+    let path = folder.path().join("scene.gltf");
+    std::fs::write(&path, scene.json.to_string()).unwrap();
+    for lightmap_coordinates in [false, true] {
+        let settings = gltf::LoadSettings { lightmap_coordinates, ..gltf::LoadSettings::default() };
+        let loaded = gltf::load_with(&path, &settings).unwrap();
+        let attributes = loaded.attributes.get(loaded.triangles[0].attributes as usize);
+        let found = attributes.map(|attributes| attributes.coordinates[1].map(|place| place.to_array()));
+        assert_eq!(found, lightmap_coordinates.then_some(corners));
+    }
+}

@@ -2,7 +2,9 @@
 
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::frame::{Frame, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame};
-use photoncard_shared::message::{self, ALBEDO_STEPS, NORMAL_STEPS, PIXEL_BYTES, PixelSums, Reply};
+use photoncard_shared::message::{
+    self, ALBEDO_STEPS, NORMAL_STEPS, PIXEL_BYTES, PixelForm, PixelSums, Reply,
+};
 
 use super::line::Random;
 
@@ -37,7 +39,7 @@ impl Lie {
     }
 
     fn apply(self, pixel: &mut [u8]) {
-        let mut sums = PixelSums::read(pixel).unwrap();
+        let mut sums = PixelSums::read(PixelForm::PLAIN, pixel).unwrap();
         match self {
             // Some lies are possible sums of a pixel without surfaces: the number of surfaces is falsified
             // then.

@@ -32,6 +32,7 @@ use super::position::Block;
 use crate::gather::{MAX_BUCKET_LINE, RESULTS_PER_LINE, Results, WrittenResults};
 use crate::irradiance_cache::Window;
 use crate::kind::{Array, Capacity, Vacant};
+use crate::light_groups::LightGroups;
 use crate::memory::{Room, WORDS};
 
 /// Rounds of a chip, and the tiles whose blocks wait in them. `W` are the containers for blocks.
@@ -61,6 +62,8 @@ pub(super) struct Rounds<W: Capacity> {
 /// Lines of a round that its gathers and results leave free.
 #[derive(Clone, Copy)]
 struct Reserve {
+    /// Maximum number of results of a gather: one for each light group.
+    results: u64,
     /// Incomplete lines of the buckets.
     buckets: u32,
     /// State of a block, and its incomplete line of results.
@@ -184,7 +187,7 @@ impl<W: Capacity> Rounds<W> {
             unread: WrittenResults::NONE,
             present: None,
             lines: 0..0,
-            reserve: Reserve { buckets: 0, block: 0 },
+            reserve: Reserve { results: 0, buckets: 0, block: 0 },
             ample: 0,
             are_two: false,
         }
@@ -372,14 +375,19 @@ impl<W: Capacity> Rounds<W> {
 impl Reserve {
     fn new(frame: &FrameParameters, budget: &Budget) -> Self {
         let block = most_words(budget, allowed_error(frame).is_some()).div_ceil(WORDS) + 1;
-        Self { buckets: gather_buckets(budget.gather_queue) as u32, block: block as u32 }
+        Self {
+            results: LightGroups::of(frame).count() as u64,
+            buckets: gather_buckets(budget.gather_queue) as u32,
+            block: block as u32,
+        }
     }
 }
 
 /// Upper bound of the number of lines of a round with `gathers` gathers, without the states of blocks other
 /// than the present one. `blocks` is the number of blocks, the present one among them.
 fn lines_of(gathers: u64, blocks: usize, reserve: &Reserve) -> u64 {
-    let lines = gathers.div_ceil(LEAST_GATHERS_OF_LINE as u64) + gathers.div_ceil(RESULTS_PER_LINE as u64);
+    let results = gathers * reserve.results;
+    let lines = gathers.div_ceil(LEAST_GATHERS_OF_LINE as u64) + results.div_ceil(RESULTS_PER_LINE as u64);
     // Each chain of a bucket or of results has one incomplete line.
     lines + u64::from(reserve.buckets) + blocks as u64 + u64::from(reserve.block)
 }
@@ -469,7 +477,7 @@ mod tests {
         fn gathers_and_results_take_no_more_lines_than_are_reserved(
             gathers in prop::collection::vec((0..BUCKETS, 0..BLOCKS), 0..200),
         ) {
-            let reserve = Reserve { buckets: BUCKETS as u32, block: 0 };
+            let reserve = Reserve { results: 1, buckets: BUCKETS as u32, block: 0 };
             prop_assert!(u64::from(lines_in_use(&gathers)) <= lines_of(gathers.len() as u64, BLOCKS, &reserve));
         }
     }

@@ -9,11 +9,12 @@ use super::super::position::{Block, Pass, Position};
 use crate::fixed_point::ColourSum;
 use crate::irradiance_cache::most_cache_words;
 use crate::kind::ChipKind;
+use crate::light_groups::LightGroups;
 use crate::memory::{MemoryPort, WordReader, WordWriter};
 
 /// Words of a block besides those of records and pixels.
 const HEAD_WORDS: usize = 8;
-/// Words of a pixel's sum, without layers.
+/// Words of a pixel's sum. A tile with several sums for each pixel has fewer pixels.
 const SUM_WORDS: usize = 6;
 
 /// Maximum number of words of a saved block. `has_records` is true in a frame with irradiance records.
@@ -68,7 +69,7 @@ impl<K: ChipKind> Flight<K> {
         }
         self.set_block(Block { x, y, width, height })?;
         let window = self.window();
-        self.cache.restore(&window, words)?;
+        self.cache.restore(&window, LightGroups::of(frame), words)?;
         if of_pixels == 0 {
             self.position = Position::at(Pass::WaitForRecords);
             return Ok(());

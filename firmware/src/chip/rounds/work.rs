@@ -1,5 +1,6 @@
 //! Work of a chip in rounds: which block proceeds, and the gathers of a round.
 
+use glam::Vec3;
 use photoncard_shared::address::{Stage, Structure};
 use photoncard_shared::message::{Drain, Fault, FrameParameters, Invariant};
 
@@ -10,6 +11,7 @@ use super::super::{Chip, GATHERS_PER_PIECE, Progress};
 use super::{OpenTile, Phase, Unfinished, WaitingBlock, first_gathers, gathers_of_pixels};
 use crate::gather::{GatherResult, PointIndex, WrittenResults};
 use crate::kind::{Array, ChipKind, Vacant};
+use crate::light_groups::LightGroups;
 use crate::memory::{MemoryPort, WordReader, WordWriter, Work};
 use crate::render::RenderJob;
 
@@ -174,10 +176,12 @@ impl<K: ChipKind> Chip<K> {
         let flight = flights.values_mut().get_mut(FLIGHT).ok_or(Invariant::Flight.fault())?;
         let (frame, sums) = (job.frame, &mut shared.sums);
         job.memory.enter(Stage::Gather);
-        shared.rounds.unread.read(job.memory, |GatherResult { target, brought }| {
+        let groups = LightGroups::of(frame);
+        shared.rounds.unread.read(job.memory, |GatherResult { target, light_group, brought }| {
+            let brought = groups.light(light_group, brought);
             match target.block_and_point().1 {
-                PointIndex::Pixel(pixel) => sums.add(frame, (FLIGHT, pixel), Component::Indirect, brought),
-                PointIndex::Record(record) => flight.cache.add(record, target.cell(), brought),
+                PointIndex::Pixel(pixel) => sums.add(frame, (FLIGHT, pixel), Component::Indirect, &brought),
+                PointIndex::Record(record) => flight.cache.add(record, target.cell(), &brought),
             }
         })?;
         Ok(Progress::Busy)
@@ -291,7 +295,14 @@ impl<K: ChipKind> Chip<K> {
             let rounds = &mut shared.rounds;
             let round = rounds.rounds.get_mut(rounds.filled).ok_or(broken)?;
             let results = rounds.results.values_mut().get_mut(block).ok_or(broken)?;
-            results.add(job.memory, &mut round.room, GatherResult { target: request.target, brought })?;
+            let (groups, target) = (LightGroups::of(job.frame), request.target);
+            for (light_group, brought) in (0..).zip(brought.groups(groups)) {
+                // A group without light has no result, unless it is the only one.
+                if groups.is_one() || brought != Vec3::ZERO {
+                    let result = GatherResult { target, light_group, brought };
+                    results.add(job.memory, &mut round.room, result)?;
+                }
+            }
         }
         Ok(())
     }

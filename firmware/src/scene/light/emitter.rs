@@ -1,4 +1,4 @@
-//! Sampling of emitters: emissive triangles, point lights and spot lights. The light tree selects an emitter.
+//! Sampling of emitters: emissive triangles, and lights at points. The light tree selects an emitter.
 //! On an emissive triangle, a point is then chosen uniformly by area.
 
 use glam::Vec3;
@@ -7,13 +7,14 @@ use photoncard_shared::layout::{BLENDS, Emitter, EmitterKind, NO_TEXTURE, Record
 use photoncard_shared::message::Fault;
 
 use super::choice::Fraction;
+use super::environment::environment_coordinates;
 use super::sample::{LightSample, Receiver};
 use super::tree::{LightChoices, select_emitter, selection_probability};
 use crate::memory::MemoryPort;
 use crate::scene::corners::Corners;
 use crate::scene::coverage::coverage;
 use crate::scene::materials::read_material;
-use crate::scene::{SceneImage, magnitude, offset_origin};
+use crate::scene::{SceneImage, magnitude, offset_origin, read_texture, sample_texture};
 use crate::vector::{max, min, unit};
 
 const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
@@ -129,22 +130,27 @@ pub(super) fn sample(
     let emitter = read_emitter(scene, memory, selection.emitter)?;
     let probability = share * selection.probability;
     let intensity = Vec3::from_array(emitter.emission);
-    match emitter.kind {
+    let sample = match emitter.kind {
         EmitterKind::Triangle { vertices, double_sided, .. } => {
             let square = [selection.rest.value(), down.value()];
             let target = emitter_point(scene, memory, &emitter, square)?;
             let density = probability / area(vertices);
-            Ok(target.and_then(|target| from_area(receiver, &target, double_sided, density)))
+            target.and_then(|target| from_area(receiver, &target, double_sided, density))
         }
-        EmitterKind::Point { position } => {
-            Ok(from_point(receiver, position.into(), probability, |_| intensity))
-        }
+        EmitterKind::Point { position } => from_point(receiver, position.into(), probability, |_| intensity),
         EmitterKind::Spot { position, direction, scale, offset } => {
             let axis = Vec3::from_array(direction);
             let towards = |direction: Vec3| intensity * falloff(-axis.dot(direction), scale, offset);
-            Ok(from_point(receiver, position.into(), probability, towards))
+            from_point(receiver, position.into(), probability, towards)
         }
-    }
+        EmitterKind::Profile { position, aim, across, texture } => {
+            let frame = ProfileFrame::new(aim, across);
+            let away = unit(receiver.origin - Vec3::from_array(position));
+            let relative = profile_intensity(scene, memory, texture, frame.local(away))?;
+            from_point(receiver, position.into(), probability, |_| intensity * relative)
+        }
+    };
+    Ok(sample.map(|sample| LightSample { light_group: emitter.light_group, ..sample }))
 }
 
 /// Angular attenuation of a spot light, `clamp(cosine * scale + offset, 0, 1)^2` (`KHR_lights_punctual`).
@@ -153,6 +159,49 @@ pub(super) fn sample(
 pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
     let linear = min(max(cosine * scale + offset, 0.0), 1.0);
     linear * linear
+}
+
+/// Directions from a light with a profile, whose map has the pole and the middle of an environment's map.
+#[derive(Clone, Copy)]
+pub struct ProfileFrame {
+    aim: Vec3,
+    across: Vec3,
+    upright: Vec3,
+}
+
+impl ProfileFrame {
+    /// Frame of the directions gamma = 0, and C = 0 at gamma = pi / 2.
+    #[inline(always)]
+    pub fn new(aim: [f32; 3], across: [f32; 3]) -> Self {
+        let (aim, across) = (Vec3::from_array(aim), Vec3::from_array(across));
+        Self { aim, across, upright: across.cross(aim) }
+    }
+
+    /// A direction in the frame: `[direction of C = 90 degrees, aim, opposite of C = 0]`.
+    #[inline(always)]
+    pub fn local(&self, direction: Vec3) -> Vec3 {
+        Vec3::new(self.upright.dot(direction), self.aim.dot(direction), -self.across.dot(direction))
+    }
+
+    /// Inverse of [`Self::local`].
+    pub fn world(&self, local: Vec3) -> Vec3 {
+        self.upright * local.x + self.aim * local.y - self.across * local.z
+    }
+}
+
+/// Intensity of a light with a profile in a direction of its frame, relative to the peak.
+///
+/// # Errors
+/// If the card image is invalid.
+pub fn profile_intensity(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    texture: u32,
+    local: Vec3,
+) -> Result<f32, Fault> {
+    let texture = read_texture(scene, memory, texture)?;
+    let [relative, ..] = sample_texture(scene, memory, &texture, environment_coordinates(local))?;
+    Ok(relative)
 }
 
 /// Creates the light sample of a point on a triangle, chosen with the probability density `density`, 1/m^2.
@@ -180,6 +229,7 @@ fn from_area(
         distance,
         irradiance: target.emission / density,
         density: Some(density),
+        light_group: 0,
     })
 }
 
@@ -197,7 +247,7 @@ fn from_point(
     let direction = way / distance;
     let irradiance = intensity(direction) / (probability * distance_squared);
     // At distance 0 there is no direction.
-    (distance > 0.0).then_some(LightSample { direction, distance, irradiance, density: None })
+    (distance > 0.0).then_some(LightSample { direction, distance, irradiance, density: None, light_group: 0 })
 }
 
 /// Area of a triangle, m^2.

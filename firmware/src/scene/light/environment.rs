@@ -101,6 +101,7 @@ pub(super) fn sample(
         distance: f32::INFINITY,
         irradiance: radiance / density,
         density: Some(density),
+        light_group: scene.header.lights.light_group,
     })
 }
 

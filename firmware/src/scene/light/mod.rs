@@ -18,7 +18,10 @@ mod sample;
 mod tree;
 
 pub use choice::Fraction;
-pub use emitter::{EmitterPoint, emitter_density, emitter_point, falloff, read_emitter};
+pub use distant::disk_direction;
+pub use emitter::{
+    EmitterPoint, ProfileFrame, emitter_density, emitter_point, falloff, profile_intensity, read_emitter,
+};
 pub use environment::{
     environment_coordinates, environment_density, environment_direction, environment_radiance,
 };
@@ -58,7 +61,7 @@ pub fn sample_light(
     }
     if distant > 0.0 {
         let across = across.within(beyond_emitters, distant);
-        return distant::sample(scene, memory, distant, across).map(Some);
+        return distant::sample(scene, memory, distant, [across, Fraction::new(v, !dither)]).map(Some);
     }
     Ok(None)
 }

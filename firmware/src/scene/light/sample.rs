@@ -37,4 +37,6 @@ pub struct LightSample {
     /// Probability density of the direction, 1/sr; `None` for lights without an area (point, spot and distant
     /// lights), which no gather ray can hit.
     pub density: Option<f32>,
+    /// Light group of the light.
+    pub light_group: u8,
 }

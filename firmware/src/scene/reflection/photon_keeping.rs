@@ -84,6 +84,7 @@ mod tests {
             cutoff: 0.0,
             textures: [NO_TEXTURE; 3],
             layers: None,
+            light_group: 0,
         })
     }
 

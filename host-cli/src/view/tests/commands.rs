@@ -76,18 +76,26 @@ fn options(random: &mut Random) -> Vec<String> {
         ("filter", random.one(Filter::ALL).name().to_owned()),
         ("camera", random.one(&["eye", "the 'left' one", "-", "$HOME"]).to_owned()),
     ];
-    let more: [(&str, &str); 6] = [
+    let more: [(&str, &str); 8] = [
         ("set", "wall 'n'.diffuse=0.1,0.2,0.3"),
         ("aov", "direct,Z"),
         ("environment", "0.5,0.25,1"),
         ("environment", "my sky.exr"),
+        ("sky", "-33.9,18.4,2026-06-21T14:30+02:00,2.5"),
+        ("north", "-30"),
         ("light-units", "watts"),
         ("texture-limit", "64"),
     ];
     let all = choices.iter().map(|(name, value)| (*name, value.as_str())).chain(more);
     for (name, value) in all {
         let is_given = named.iter().any(|option| option.starts_with(&format!("--{name}=")));
-        if random.below(3) == 0 && !is_given {
+        let has = |other: &str| named.iter().any(|option| option.starts_with(&format!("--{other}=")));
+        let is_excluded = match name {
+            "sky" => has("environment"),
+            "north" => !has("sky"),
+            _ => false,
+        };
+        if random.below(3) == 0 && !is_given && !is_excluded {
             named.push(format!("--{name}={value}"));
         }
     }
@@ -154,6 +162,8 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         assert_eq!(render.scene.assignments, wish.assignments(), "{line}");
         assert_eq!(render.scene.variant, view.scene.variant, "{line}");
         assert_eq!(render.scene.environment, view.scene.environment, "{line}");
+        assert_eq!(render.scene.sky, view.scene.sky, "{line}");
+        assert_eq!(render.scene.north, view.scene.north, "{line}");
         assert_eq!(render.scene.lights.light_units, view.scene.lights.light_units, "{line}");
         let path = render.scene.path.strip_prefix(".").unwrap_or(&render.scene.path);
         assert_eq!(path, view.scene.path, "{line}");

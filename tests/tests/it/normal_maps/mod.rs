@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::film::{Film, Window};
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
-    Camera, Encoding, Environment, Image, Layers, Material, NormalMap, Projection, PunctualKind,
+    Camera, Encoding, Environment, Image, Layers, LightAxes, Material, NormalMap, Projection, PunctualKind,
     PunctualLight, Reflection, Scene, Sheen, Texture,
 };
 use photoncard_tests::shapes::{add_ball, add_tangents, add_textured_quad};
@@ -103,8 +103,9 @@ fn far_camera(direction: Vec3) -> Camera {
 fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
     PunctualLight {
         name: "light".into(),
-        kind: PunctualKind::Directional { direction: -direction.as_vec3() },
+        kind: PunctualKind::Directional { direction: -direction.as_vec3(), angle: 0.0 },
         intensity: Vec3::splat(irradiance),
+        axes: LightAxes::default(),
     }
 }
 

@@ -4,7 +4,7 @@
 const PROPOSED: usize = 5;
 
 /// Lists the known names that are most similar to an unknown one.
-pub(super) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let mut names: Vec<_> = known.collect();
     names.sort_by_cached_key(|candidate| edit_distance(name, candidate));
     names.dedup();
