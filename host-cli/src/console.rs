@@ -3,21 +3,57 @@
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use photoncard_driver::printable::printable;
+use serde_json::{Value, json};
 
 use crate::failure::Failure;
 use crate::flags::with_flags;
 
-/// Writes a line to standard error. Settings' names in errors of the library, such as `integrator.samples`,
-/// are replaced by command-line flags. Errors of the stream are ignored.
-pub(crate) fn say(line: Arguments) {
-    let _ = writeln!(stderr(), "{}", printable(&with_flags(&line.to_string())));
+/// Whether standard error takes JSON objects in place of lines of text.
+static IS_JSON: AtomicBool = AtomicBool::new(false);
+
+/// Makes all later messages on standard error JSON objects, one a line (`docs/cli.md`).
+pub(crate) fn speak_json() {
+    IS_JSON.store(true, Ordering::Relaxed);
 }
 
-/// Writes a failure to standard error on lines of its own. The failure's `Display` escapes foreign text.
+/// Returns whether messages are JSON objects.
+pub(crate) fn is_json() -> bool {
+    IS_JSON.load(Ordering::Relaxed)
+}
+
+/// Writes a line to standard error. Settings' names in errors of the library, such as `integrator.samples`,
+/// are replaced by command-line flags. Errors of the stream are ignored. As JSON the line is an object of the
+/// kind `message`.
+pub(crate) fn say(line: Arguments) {
+    let line = with_flags(&line.to_string());
+    if is_json() {
+        say_json(&json!({ "kind": "message", "message": without_program(&line) }));
+    } else {
+        let _ = writeln!(stderr(), "{}", printable(&line));
+    }
+}
+
+/// Writes a JSON object to standard error, on a line of its own. Errors of the stream are ignored.
+pub(crate) fn say_json(object: &Value) {
+    let _ = writeln!(stderr(), "{}", printable_json(&object.to_string()));
+}
+
+/// Writes a failure to standard error: text on lines of its own, whose foreign parts are escaped, or an
+/// object of the kind `failure`.
 pub(crate) fn say_failure(failure: &Failure) {
-    let _ = writeln!(stderr(), "{failure}");
+    if is_json() {
+        say_json(&failure.json());
+    } else {
+        let _ = writeln!(stderr(), "{failure}");
+    }
+}
+
+/// Cuts off the program's name, with which a line of text begins.
+fn without_program(line: &str) -> &str {
+    line.strip_prefix("photoncard: ").unwrap_or(line)
 }
 
 /// Formats a number with its noun, in the plural unless it is 1.
@@ -70,8 +106,6 @@ pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
-
     use super::*;
 
     #[test]

@@ -7,8 +7,10 @@ use std::process::ExitCode;
 use miette::{Diagnostic, MietteDiagnostic, Report};
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::RenderError;
+use serde_json::{Value, json};
 
 use crate::flags::with_flags;
+use crate::report::help;
 
 /// Failure of a command.
 pub(crate) enum Failure {
@@ -75,12 +77,30 @@ impl Failure {
     }
 
     pub(crate) fn status(&self) -> ExitCode {
+        ExitCode::from(self.code())
+    }
+
+    fn code(&self) -> u8 {
         match self {
-            Self::Input(_) => ExitCode::from(2),
-            Self::Work(_) => ExitCode::from(1),
-            Self::Stopped(_) => ExitCode::from(130),
+            Self::Input(_) => 2,
+            Self::Work(_) => 1,
+            Self::Stopped(_) => 130,
         }
     }
+
+    /// Message, remedy and exit status as an object of the kind `failure`.
+    pub(crate) fn json(&self) -> Value {
+        let remedy = match self {
+            Self::Input(report) | Self::Work(report) => help(report.as_ref()),
+            Self::Stopped(_) => None,
+        };
+        failure_json(&self.line(), remedy.as_deref(), self.code())
+    }
+}
+
+/// Object of the kind `failure` of `--progress json`.
+pub(crate) fn failure_json(message: &str, remedy: Option<&str>, status: u8) -> Value {
+    json!({ "kind": "failure", "message": message, "remedy": remedy, "status": status })
 }
 
 impl fmt::Display for Failure {

@@ -69,6 +69,9 @@ pub fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
     let mut arguments = Arguments::parse_printably();
     report::lay_out_errors();
+    if arguments.command.progress() == ProgressForm::Json {
+        console::speak_json();
+    }
     let result = match &mut arguments.command {
         Command::Render(options) => render::run(options),
         Command::Prepare(options) => render::prepare::run(options),

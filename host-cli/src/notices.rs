@@ -6,9 +6,10 @@ use std::path::Path;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::render::Picture;
 use photoncard_driver::scene::{Concern, Scene};
+use serde_json::json;
 
 use crate::arguments::{FrameOptions, SceneOptions};
-use crate::console::say;
+use crate::console::{is_json, say, say_json};
 use crate::failure::Failure;
 
 /// Maximum number of sentences in one message. Further sentences are only counted.
@@ -54,7 +55,11 @@ pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) ->
     let notices = scene.notices_on(|concern| uses.uses(concern));
     let Some(line) = first(&options.path, &notices) else { return Ok(()) };
     if !options.strict {
-        say(format_args!("photoncard: ignored or missing: {line}"));
+        if is_json() {
+            say_json(&json!({ "kind": "ignored", "message": line, "items": notices }));
+        } else {
+            say(format_args!("photoncard: ignored or missing: {line}"));
+        }
         return Ok(());
     }
     let report = MietteDiagnostic::new(format!("--strict: {}", notices.join("; ")));
@@ -65,7 +70,10 @@ pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) ->
 /// Prints remarks about contents that are interpreted otherwise than the file states.
 pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     let remarks: Vec<_> = scene.remarks.iter().map(String::as_str).collect();
-    if let Some(line) = first(path, &remarks) {
+    let Some(line) = first(path, &remarks) else { return };
+    if is_json() {
+        say_json(&json!({ "kind": "note", "message": line, "items": remarks }));
+    } else {
         say(format_args!("photoncard: note: {line}"));
     }
 }

@@ -35,7 +35,7 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
     if pictures.iter().any(|picture| picture.format == PictureFormat::Video) {
         return Err(video::needless());
     }
-    check_standard_output(pictures, None, *progress)?;
+    check_standard_output(pictures, false, &[*progress == ProgressForm::Openjd])?;
     let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
     let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
     outputs::check(&inputs, &written, &[])?;
@@ -101,7 +101,7 @@ pub(crate) fn mix(options: &MixOptions) -> Result<(), Failure> {
             return Err(needless());
         }
     }
-    check_standard_output(pictures, None, ProgressForm::Text)?;
+    check_standard_output(pictures, false, &[])?;
     let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
     outputs::check(&[(input, "the picture to mix")], &written, &[])?;
     let denoiser = denoiser(*denoise)?;

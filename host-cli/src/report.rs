@@ -116,7 +116,7 @@ fn messages(error: &dyn Diagnostic) -> Vec<String> {
 }
 
 /// Escaped remedy of an error, or of the first of its causes that has one.
-fn help(error: &dyn Diagnostic) -> Option<String> {
+pub(crate) fn help(error: &dyn Diagnostic) -> Option<String> {
     match error.help() {
         Some(help) => Some(escaped(help)),
         None => help(error.diagnostic_source()?),

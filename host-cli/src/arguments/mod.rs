@@ -118,7 +118,12 @@ impl Arguments {
             let escaped = given.iter().map(|argument| printable(&argument.to_string_lossy()).into_owned());
             let escaped: Vec<_> = escaped.collect();
             let error = Self::try_parse_from(&escaped).err().unwrap_or(error);
-            suggestions::with_suggestion(prepared::with_remedy(error), Self::command(), &escaped).exit()
+            let error = suggestions::with_suggestion(prepared::with_remedy(error), Self::command(), &escaped);
+            if error.use_stderr() && progress::state_json(&escaped) {
+                progress::say_json(&error);
+                std::process::exit(error.exit_code());
+            }
+            error.exit()
         })
     }
 }

@@ -42,9 +42,9 @@ pub(crate) struct OutputOptions {
     /// layer denoised. With this option --quality chooses fewer samples and rays, and no irradiance cache.
     #[arg(long)]
     pub(crate) denoise: bool,
-    /// Show finished tiles during the render, in tev or another viewer that has tev's protocol [default port:
-    /// 14158]
-    #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
+    /// Show finished tiles during the render, in tev or another viewer that has tev's protocol; - for
+    /// standard output [default port: 14158]
+    #[arg(long, value_name = "HOST:PORT", allow_hyphen_values = true, hide_short_help = true)]
     display_server: Option<DisplayAddress>,
     /// Write statistics of the render as JSON; - for standard output
     #[arg(long, value_name = "OUT.json", value_parser = text())]
@@ -119,6 +119,11 @@ impl OutputOptions {
     /// Returns whether layers are stored or shown: in an EXR or a part, or on a display server.
     pub(super) fn have_layers(&self) -> bool {
         self.display_server.is_some() || self.has(PictureFormat::Part) || self.has(PictureFormat::Exr)
+    }
+
+    /// Returns whether finished tiles go to standard output.
+    pub(crate) fn pipes_tiles(&self) -> bool {
+        self.display_server == Some(DisplayAddress::StandardOutput)
     }
 
     /// Returns whether a picture of this format is written.

@@ -1,5 +1,5 @@
 //! Progress of a render or of a card's self-test: a bar on a terminal, elsewhere a line for each tenth of a
-//! phase.
+//! phase, or JSON objects.
 
 pub(crate) mod remaining;
 
@@ -8,16 +8,16 @@ use std::fmt::Arguments;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{CardError, Observer, Phase};
-use serde_json::Value;
+use serde_json::{Value, json};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use self::remaining::Remaining;
 use crate::arguments::ProgressForm;
-use crate::console::{print, say};
+use crate::console::{is_json, print, say, say_json};
 use crate::failure::Failure;
 #[cfg(target_os = "linux")]
 use crate::hang_up;
@@ -45,10 +45,33 @@ struct Display {
     cards: usize,
     /// Number of tiles that an earlier render has finished.
     resumed: u64,
-    on_terminal: bool,
+    form: Form,
     /// Tenths of the phase that were finished at the last printed line; used without a terminal.
     told: u64,
+    /// Time of the last object.
+    told_at: Option<Instant>,
 }
+
+/// Form of the progress on standard error.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Bar,
+    Lines,
+    Json,
+}
+
+impl Form {
+    fn of_standard_error() -> Self {
+        match (is_json(), std::io::stderr().is_terminal()) {
+            (true, _) => Self::Json,
+            (false, true) => Self::Bar,
+            (false, false) => Self::Lines,
+        }
+    }
+}
+
+/// Least time between two objects of a phase. The first and the last one of a phase are always written.
+const JSON_INTERVAL: Duration = Duration::from_millis(100);
 
 impl Progress {
     /// Starts the display of work on `cards` cards; nothing is shown if `quiet`. The first signal stops the
@@ -60,8 +83,9 @@ impl Progress {
             remaining: Remaining::new(1, 0),
             cards,
             resumed: 0,
-            on_terminal: std::io::stderr().is_terminal(),
+            form: Form::of_standard_error(),
             told: 0,
+            told_at: None,
         };
         let display = (!quiet).then_some(Mutex::new(display));
         let (stopped, kept) = (stop_on_signals()?, AtomicBool::new(false));
@@ -72,14 +96,14 @@ impl Progress {
     /// printed.
     pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
         match form {
-            ProgressForm::Text => self,
+            ProgressForm::Text | ProgressForm::Json => self,
             ProgressForm::Openjd => Self { display: None, percent: Some(Percent::of(phase)), ..self },
         }
     }
 
-    /// Starts the display for a sequence of frames. Without a terminal, nothing is shown during a frame.
+    /// Starts the display for a sequence of frames. Lines show nothing during a frame.
     pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
-        Self::start(quiet || !std::io::stderr().is_terminal(), cards)
+        Self::start(quiet || Form::of_standard_error() == Form::Lines, cards)
     }
 
     /// Starts the display of the next frame.
@@ -169,8 +193,9 @@ impl Observer for Progress {
 
 impl Display {
     fn show(&mut self, phase: Phase, done: u64, total: u64) {
-        // Each pass of a picture renders its tiles again. Without a terminal only the first pass is shown.
-        let is_next_pass = phase == Phase::Tiles && done == 0 && self.bar.position() > 0 && self.on_terminal;
+        // Each pass of a picture renders its tiles again. Lines show only the first pass.
+        let is_of_pass = phase == Phase::Tiles && self.form != Form::Lines;
+        let is_next_pass = is_of_pass && done == 0 && self.bar.position() > 0;
         if self.phase.is_none_or(|shown| (shown as u8) < phase as u8) || is_next_pass {
             self.begin(phase, total);
         }
@@ -183,30 +208,52 @@ impl Display {
         let seconds = self.bar.elapsed().as_secs_f64();
         self.remaining.report(done, total, seconds);
         self.bar.set_position(done);
-        let left = self.remaining.seconds(seconds).map(duration);
-        let left = left.map_or(String::new(), |left| format!(", {left} left"));
+        let left = self.remaining.seconds(seconds);
+        if self.form == Form::Json {
+            return self.tell_json((phase, done, total), seconds, left);
+        }
+        let left = left.map(duration).map_or(String::new(), |left| format!(", {left} left"));
         self.bar.set_prefix(left.clone());
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
         // A short phase before the tiles prints only its last line.
         let is_brief = phase != Phase::Tiles && done < total && seconds < SILENT_SECONDS;
-        if !self.on_terminal && tenths > self.told && !is_brief {
+        if self.form == Form::Lines && tenths > self.told && !is_brief {
             self.told = tenths;
             say(format_args!("photoncard: {} {done} of {total}, {seconds:.1} s{left}", name(phase)));
         }
     }
 
+    /// Writes an object of the kind `progress`, unless the last one is recent.
+    fn tell_json(&mut self, (phase, done, total): (Phase, u64, u64), seconds: f64, left: Option<f64>) {
+        let is_recent = self.told_at.is_some_and(|told| told.elapsed() < JSON_INTERVAL);
+        if is_recent && done < total {
+            return;
+        }
+        self.told_at = Some(Instant::now());
+        say_json(&json!({
+            "kind": "progress",
+            "phase": name(phase),
+            "done": done,
+            "total": total,
+            "seconds": seconds,
+            "seconds_left": left,
+        }));
+    }
+
     fn begin(&mut self, phase: Phase, total: u64) {
         self.bar.finish_and_clear();
         self.phase = Some(phase);
-        self.told = 0;
+        (self.told, self.told_at) = (0, None);
         self.remaining = match phase {
             Phase::Tiles => Remaining::new(self.cards, self.resumed),
             Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load | Phase::SelfTest => {
                 Remaining::new(1, 0)
             }
         };
-        let target =
-            if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = match self.form {
+            Form::Bar => ProgressDrawTarget::stderr(),
+            Form::Lines | Form::Json => ProgressDrawTarget::hidden(),
+        };
         self.bar = ProgressBar::with_draw_target(Some(total), target);
         let template = match phase {
             Phase::Load | Phase::SelfTest => "{msg:8} {bar:40} {bytes}/{total_bytes}{prefix}",

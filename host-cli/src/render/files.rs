@@ -30,7 +30,8 @@ use crate::input;
 /// finished tiles of an earlier render is overwritten.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
-    check_standard_output(&outputs.pictures, outputs.stats.as_ref(), options.progress)?;
+    let texts = [outputs.stats == Some(TextOutput::StandardOutput), options.progress == ProgressForm::Openjd];
+    check_standard_output(&outputs.pictures, outputs.pipes_tiles(), &texts)?;
     check_kept(options, outputs)?;
     let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
@@ -45,18 +46,19 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     }
 }
 
-/// Checks that a picture on standard output is the only output there, and that it does not go to a terminal.
+/// Checks that a picture on standard output, or tiles if `has_tiles`, are the only output there, and that
+/// they do not go to a terminal. `texts` says which texts go there.
 pub(crate) fn check_standard_output(
     pictures: &[PictureOutput],
-    stats: Option<&TextOutput>,
-    progress: ProgressForm,
+    has_tiles: bool,
+    texts: &[bool],
 ) -> Result<(), Failure> {
     let pictures = pictures.iter().filter(|picture| picture.file().is_none()).count();
-    let has_progress = progress == ProgressForm::Openjd;
-    let texts = usize::from(stats == Some(&TextOutput::StandardOutput)) + usize::from(has_progress);
-    let [text, help] = if pictures > 0 && pictures + texts > 1 {
+    let binary = pictures + usize::from(has_tiles);
+    let texts = texts.iter().filter(|is_there| **is_there).count();
+    let [text, help] = if binary > 0 && binary + texts > 1 {
         ["standard output takes one output alone", "give the other ones files"]
-    } else if pictures > 0 && std::io::stdout().is_terminal() {
+    } else if binary > 0 && std::io::stdout().is_terminal() {
         ["a picture is not written to a terminal", "direct it to a file or a pipe, such as: -o - | feh -"]
     } else {
         return Ok(());

@@ -9,15 +9,15 @@ use photoncard_driver::exr::{Shown, read};
 
 /// Picture that a viewer builds from the packets it receives.
 #[derive(Default)]
-struct Viewed {
+pub(crate) struct Viewed {
     name: String,
-    width: usize,
-    height: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     channels: Vec<String>,
     /// Values of each channel, row by row.
-    values: Vec<Vec<f32>>,
+    pub(crate) values: Vec<Vec<f32>>,
     /// Number of packets with pixels.
-    updates: usize,
+    pub(crate) updates: usize,
 }
 
 /// Bytes of a packet that are not parsed yet.
@@ -56,6 +56,17 @@ impl Fields<'_> {
 }
 
 impl Viewed {
+    /// Picture of a stream of packets.
+    pub(crate) fn of(mut stream: &[u8]) -> Self {
+        let mut viewed = Self::default();
+        while let Some((length, _)) = stream.split_first_chunk() {
+            let (packet, others) = stream.split_at(u32::from_le_bytes(*length) as usize);
+            viewed.take(packet);
+            stream = others;
+        }
+        viewed
+    }
+
     fn take(&mut self, packet: &[u8]) {
         let mut fields = Fields(packet);
         assert_eq!(fields.number(), packet.len());
@@ -104,14 +115,7 @@ fn viewer() -> (SocketAddr, JoinHandle<Viewed>) {
         let (mut stream, _) = listener.accept().unwrap();
         let mut bytes = Vec::new();
         stream.read_to_end(&mut bytes).unwrap();
-        let mut viewed = Viewed::default();
-        let mut rest = bytes.as_slice();
-        while let Some((length, _)) = rest.split_first_chunk() {
-            let (packet, others) = rest.split_at(u32::from_le_bytes(*length) as usize);
-            viewed.take(packet);
-            rest = others;
-        }
-        viewed
+        Viewed::of(&bytes)
     };
     (address, thread::spawn(view))
 }

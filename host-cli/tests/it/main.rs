@@ -17,6 +17,7 @@ mod frames;
 mod information;
 mod interrupt;
 mod links;
+mod machine_readable;
 mod measure;
 mod mix;
 mod notices;

@@ -1,4 +1,4 @@
-//! Address of a display server, and errors of the connection to it.
+//! Address of a display server, or standard output in its place, and errors of the connection to it.
 
 use std::str::FromStr;
 use std::{fmt, io};
@@ -8,19 +8,37 @@ use photoncard_cards::link::host_name;
 /// Default port of tev.
 const DEFAULT_PORT: u16 = 14158;
 
-/// Address of a display server in the form `HOST:PORT`.
+/// Address of a display: of a server in the form `HOST:PORT`, or `-`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DisplayAddress {
-    /// Name or IP address of the machine.
-    pub host: String,
-    /// TCP port.
-    pub port: u16,
+pub enum DisplayAddress {
+    /// A display server.
+    Server {
+        /// Name or IP address of the machine.
+        host: String,
+        /// TCP port.
+        port: u16,
+    },
+    /// The standard output of the process, from which another program reads the packets.
+    StandardOutput,
+}
+
+impl DisplayAddress {
+    /// Description for messages.
+    fn described(&self) -> String {
+        match self {
+            Self::Server { .. } => format!("the display server at {self}"),
+            Self::StandardOutput => "the reader of standard output".to_owned(),
+        }
+    }
 }
 
 impl fmt::Display for DisplayAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { host, port } = self;
-        if host.contains(':') { write!(f, "[{host}]:{port}") } else { write!(f, "{host}:{port}") }
+        match self {
+            Self::Server { host, port } if host.contains(':') => write!(f, "[{host}]:{port}"),
+            Self::Server { host, port } => write!(f, "{host}:{port}"),
+            Self::StandardOutput => f.write_str("-"),
+        }
     }
 }
 
@@ -28,6 +46,9 @@ impl FromStr for DisplayAddress {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == "-" {
+            return Ok(Self::StandardOutput);
+        }
         let (host, port) = match text.rsplit_once(':') {
             // The colons of an IPv6 address are in brackets.
             Some((host, port)) if !port.ends_with(']') => (host, Some(port)),
@@ -42,7 +63,7 @@ impl FromStr for DisplayAddress {
             None => DEFAULT_PORT,
             Some(port) => port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?,
         };
-        Ok(Self { host: host_name(host)?, port })
+        Ok(Self::Server { host: host_name(host)?, port })
     }
 }
 
@@ -52,7 +73,8 @@ impl FromStr for DisplayAddress {
 pub enum DisplayError {
     /// The server cannot be reached.
     #[error(
-        "cannot reach the display server at {address}: {source}; start tev there, or leave `outputs.display` out"
+        "cannot reach {}: {source}; start tev there, or leave `outputs.display` out",
+        address.described()
     )]
     Connect {
         /// Address of the server.
@@ -61,7 +83,7 @@ pub enum DisplayError {
         source: io::Error,
     },
     /// The connection has ended.
-    #[error("the display server at {address} is gone: {source}")]
+    #[error("{} is gone: {source}", address.described())]
     Gone {
         /// Address of the server.
         address: DisplayAddress,
@@ -69,7 +91,7 @@ pub enum DisplayError {
         source: io::Error,
     },
     /// The server did not take all packets in time.
-    #[error("the display server at {address} takes no more: {packets} packets of the picture are not shown")]
+    #[error("{} takes no more: {packets} packets of the picture are not shown", address.described())]
     Slow {
         /// Address of the server.
         address: DisplayAddress,
@@ -89,6 +111,7 @@ mod tests {
             ("127.0.0.1:80", "127.0.0.1:80"),
             ("[::1]", "[::1]:14158"),
             ("[::1]:7000", "[::1]:7000"),
+            ("-", "-"),
         ] {
             let address: DisplayAddress = text.parse().unwrap();
             assert_eq!(address.to_string(), full);

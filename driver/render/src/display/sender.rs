@@ -194,7 +194,7 @@ impl Watch {
 /// Connects, and sends packets until the display is closed or fails.
 fn send_packets(address: &DisplayAddress, queue: &SharedQueue) {
     let result = match connect(address) {
-        Ok(mut stream) => send_all(&mut stream, queue)
+        Ok(mut stream) => send_all(&mut *stream, queue)
             .map_err(|source| DisplayError::Gone { address: address.clone(), source }),
         Err(source) => Err(DisplayError::Connect { address: address.clone(), source }),
     };
@@ -203,14 +203,18 @@ fn send_packets(address: &DisplayAddress, queue: &SharedQueue) {
     }
 }
 
-fn connect(address: &DisplayAddress) -> io::Result<TcpStream> {
+fn connect(address: &DisplayAddress) -> io::Result<Box<dyn Write>> {
+    let (host, port) = match address {
+        DisplayAddress::Server { host, port } => (host.as_str(), *port),
+        DisplayAddress::StandardOutput => return Ok(Box::new(io::stdout())),
+    };
     let mut last = io::Error::other("the host's name has no address");
-    for address in (address.host.as_str(), address.port).to_socket_addrs()? {
+    for address in (host, port).to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT_WAIT) {
             Ok(stream) => {
                 stream.set_nodelay(true)?;
                 stream.set_write_timeout(Some(WRITE_WAIT))?;
-                return Ok(stream);
+                return Ok(Box::new(stream));
             }
             Err(error) => last = error,
         }
@@ -218,7 +222,7 @@ fn connect(address: &DisplayAddress) -> io::Result<TcpStream> {
     Err(last)
 }
 
-fn send_all(stream: &mut TcpStream, queue: &SharedQueue) -> io::Result<()> {
+fn send_all(stream: &mut dyn Write, queue: &SharedQueue) -> io::Result<()> {
     while let Some(packet) = queue.next() {
         let mut rest = packet.as_slice();
         while !rest.is_empty() {
@@ -229,6 +233,10 @@ fn send_all(stream: &mut TcpStream, queue: &SharedQueue) -> io::Result<()> {
                 Err(error) => return Err(error),
             };
             rest = &rest[count..];
+            // Standard output keeps bytes back until a line ends.
+            if rest.is_empty() {
+                stream.flush()?;
+            }
             if !queue.advance(count, rest.is_empty()) {
                 return Ok(());
             }
