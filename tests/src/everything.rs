@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
     Coat, DiffuseTransmission, Encoding, Environment, Image, Layers, LightAxes, LightProfile, Material,
     NormalMap, PunctualKind, PunctualLight, Reflection, Scene, Sheen, Texture, Transmission, Triangle,
-    VertexAttributes, Wrap,
+    VertexAttributes, Visibility, Wrap,
 };
 
 use crate::shapes::{add_ball, add_tangents, add_textured_quad, cuboid};
@@ -27,13 +27,15 @@ const ICE: u32 = 11;
 const BUMPS: u32 = 12;
 const DENTS: u32 = 13;
 const WINDOW: u32 = 14;
+const PANEL: u32 = 15;
+const GHOST: u32 = 16;
 
 /// Creates a room with every feature. It has an emissive lamp, a point, a spot and a directional light, a
 /// luminaire, a sky through its open front, and walls with textures by both sets of coordinates. In the room
 /// are a mirror ball, a glass ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage
 /// with sheen and diffuse transmission, a coated board, a rough pane and a rough block of glass, and a glossy
 /// and a Lambertian sheet with normal maps. Under the lights are a shelf of tinted glass and a coated window
-/// with textures.
+/// with textures. The camera does not see a lamp without substance and a block.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
@@ -76,6 +78,10 @@ pub fn everything() -> Scene {
         let along = Vec3::new(1.0, 0.0, 0.3).normalize();
         add_tangents(&mut scene, material, along.extend(x.signum()));
     }
+    let low = |x: f32, z: f32| Vec3::new(0.55 + x, -0.95, 0.5 + z);
+    let panel = [low(-0.1, -0.1), low(-0.1, 0.1), low(0.1, 0.1), low(0.1, -0.1)];
+    scene.triangles.extend(quad(panel, PANEL));
+    scene.triangles.extend(cuboid(Vec3::new(-0.6, -0.9, 0.5), Vec3::splat(0.08), GHOST));
     // Neighbouring triangles are of different objects.
     scene.objects = (0..5).map(|object| format!("object {object}")).collect();
     for (index, triangle) in (0..).zip(&mut scene.triangles) {
@@ -142,6 +148,12 @@ fn materials() -> Vec<Material> {
             layers: Some(Box::new(Layers { transmission_texture: Some(2), ..varnish(&none) })),
             ..Material::new("window", glossy(0.0, 0.0, Some(thin)))
         },
+        Material {
+            emission: Vec3::new(3.0, 4.0, 5.0),
+            visibility: Visibility { camera: false, light: false },
+            ..lambertian("panel", 0.0)
+        },
+        Material { visibility: Visibility { camera: false, light: true }, ..lambertian("ghost", 0.5) },
     ]
 }
 

@@ -50,7 +50,7 @@ pub use self::light_groups::{LightGroups, LightSource};
 pub use self::light_units::LightUnits;
 pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
-pub use self::material::{Material, Reflection, Transmission};
+pub use self::material::{Material, Reflection, Transmission, Visibility};
 pub use self::parts::{Part, parts};
 pub use self::photometry::LightProfile;
 pub use self::settings::profile_of;

@@ -44,6 +44,32 @@ pub struct Material {
     pub energy_compensation: bool,
     /// Layers beyond the base; `None` for most materials.
     pub layers: Option<Box<Layers>>,
+    /// Rays for which the surface is there.
+    pub visibility: Visibility,
+}
+
+/// Rays for which a surface is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visibility {
+    /// True if the rays of pixels meet the surface. Mirrors and glass show it in any case.
+    pub camera: bool,
+    /// True if the surface casts shadows and photons arrive at it. A lamp without substance does not: its
+    /// front lights what lies before it, and all else passes it.
+    pub light: bool,
+}
+
+impl Default for Visibility {
+    /// A surface that is there for all rays.
+    fn default() -> Self {
+        Self { camera: true, light: true }
+    }
+}
+
+impl Visibility {
+    /// Returns whether the surface is there for all rays.
+    pub fn is_whole(self) -> bool {
+        self.camera && self.light
+    }
 }
 
 /// Reflection and transmission model of a surface.
@@ -111,6 +137,7 @@ impl Material {
             emissive_texture: None,
             energy_compensation: false,
             layers: None,
+            visibility: Visibility::default(),
         }
     }
 

@@ -19,7 +19,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::camera::pixel_side;
-use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
+use crate::scene::{BUNDLE_RAYS, Ray, RayKind, Surface, closest_hits};
 use crate::vector::min;
 
 /// Minimum of `radius of validity * sqrt(allowed error)`, pixels: the distance up to which a record is valid.
@@ -206,5 +206,5 @@ fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, 
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
     let direction = direction_in(surface.normal, cell, square);
-    surface.is_above(direction).then(|| Ray::new(surface.offset_origin(), direction))
+    surface.is_above(direction).then(|| Ray::new(RayKind::Radiance, surface.offset_origin(), direction))
 }

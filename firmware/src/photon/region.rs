@@ -178,7 +178,7 @@ impl VisibleRegion {
         let rays: [Ray; SECTORS] = core::array::from_fn(|ray| {
             let [cosine, sine] = azimuth(ray);
             let direction = tangent * cosine + bitangent * sine;
-            Ray { origin, direction, max_distance: reach }
+            Ray::of_light(origin, direction, reach)
         });
         let mut hits = [None; BUNDLE_RAYS];
         closest_hits(scene, memory, &rays, &mut hits)?;
@@ -211,7 +211,7 @@ impl VisibleRegion {
         (above, coded): (Vec3, Vec3),
         [up, down]: [f32; 2],
     ) -> Result<(f32, Vec3), Fault> {
-        let ray = |direction: Vec3, max_distance: f32| Ray { origin: above, direction, max_distance };
+        let ray = |direction: Vec3, max_distance: f32| Ray::of_light(above, direction, max_distance);
         let mut hits = [None; BUNDLE_RAYS];
         closest_hits(scene, memory, &[ray(coded, up), ray(-coded, down)], &mut hits)?;
         let [ceiling, ground, ..] = &hits;
@@ -242,7 +242,7 @@ pub(super) fn is_covered(
     let direction = unit_normal(normal);
     let origin = offset_origin(position, direction, magnitude(&[position])) + direction * lift(scene, radius);
     memory.enter(Stage::GatherRay);
-    let up = closest_hit(scene, memory, &Ray { origin, direction, max_distance: MAX_SLOPE * radius })?;
+    let up = closest_hit(scene, memory, &Ray::of_light(origin, direction, MAX_SLOPE * radius))?;
     memory.enter(Stage::Gather);
     Ok(up.is_some())
 }

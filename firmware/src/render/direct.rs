@@ -91,7 +91,7 @@ impl ShadowRays {
     /// Adds the shadow ray of a light sample.
     fn push(&mut self, origin: Vec3, light: LightSample) -> Result<(), Fault> {
         let LightSample { direction, distance, .. } = light;
-        let ray = Ray { origin, direction, max_distance: distance * SHORTER };
+        let ray = Ray::of_light(origin, direction, distance * SHORTER);
         self.rays.push(ray).map_err(|_| Invariant::Bundle.fault())?;
         self.lights.push(light).map_err(|_| Invariant::Bundle.fault())
     }

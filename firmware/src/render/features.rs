@@ -12,7 +12,7 @@ use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choic
 use super::{Context, PixelSample};
 use crate::memory::MemoryPort;
 use crate::sampler::Dimension;
-use crate::scene::{Ray, ReflectedDirection, Surface, closest_hit, read_surface};
+use crate::scene::{Ray, RayKind, ReflectedDirection, Surface, closest_hit, read_surface};
 
 /// Minimum fraction of a surface's albedo that its sharp lobe must contribute, so that the features are taken
 /// from the surface that the lobe reflects.
@@ -69,7 +69,7 @@ fn reflected<M: MemoryPort>(
         return Ok(Features::NOTHING);
     }
     context.counters.specular_rays += 1;
-    let ray = Ray::new(surface.offset_origin(), direction);
+    let ray = Ray::new(RayKind::Radiance, surface.offset_origin(), direction);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {
         return Ok(Features::NOTHING);
     };

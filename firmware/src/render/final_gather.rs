@@ -20,7 +20,8 @@ use crate::photon::{
 };
 use crate::scene::light::environment_radiance;
 use crate::scene::{
-    BUNDLE_RAYS, Detail, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface_with,
+    BUNDLE_RAYS, Detail, Hit, PartialReflection, Ray, RayKind, Reflector, Surface, closest_hits,
+    read_surface_with,
 };
 
 /// Contribution of one final gather ray.
@@ -65,7 +66,7 @@ pub fn cast<M: MemoryPort>(
         let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
         if let Some(sampled) = sampled.filter(|sampled| point.surface.is_above(sampled.direction)) {
             aimed.push((index, sampled)).map_err(|_| Invariant::Bundle.fault())?;
-            let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
+            let ray = Ray::new(RayKind::Radiance, point.surface.offset_origin(), sampled.direction);
             bundle.push(ray).map_err(|_| Invariant::Bundle.fault())?;
         }
     }

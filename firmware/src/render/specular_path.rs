@@ -19,8 +19,8 @@ use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{
-    Hit, Ray, ReflectedDirection, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface,
-    transmittance,
+    Hit, Ray, RayKind, ReflectedDirection, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit,
+    read_surface, transmittance,
 };
 use crate::vector::{max, max_component, min};
 
@@ -60,6 +60,15 @@ pub enum Carried {
     Radiance,
     /// Power. The path is that of a photon, from a light.
     Power,
+}
+
+impl Carried {
+    fn ray_kind(self) -> RayKind {
+        match self {
+            Self::Radiance => RayKind::Radiance,
+            Self::Power => RayKind::Light,
+        }
+    }
 }
 
 /// Kinds of surfaces that a path passes.
@@ -188,6 +197,7 @@ impl SpecularPath {
         if all <= 0.0 || self.bounces >= SPECULAR_BOUNCES {
             return Arrival::Lost;
         }
+        let kind = self.carried.ray_kind();
         self.bounces += 1;
         self.travelled += surface.distance;
         let was_straight = core::mem::replace(&mut self.is_straight, false);
@@ -203,14 +213,14 @@ impl SpecularPath {
                 return Arrival::Absorbed;
             }
             self.throughput *= weight * (all / glossy);
-            self.ray = Ray::new(surface.offset_origin(), direction);
+            self.ray = Ray::new(kind, surface.offset_origin(), direction);
         } else if chosen < stays + reflected || transmitted <= 0.0 {
             self.throughput *= specular.reflected * (all / reflected);
-            self.ray = Ray::new(surface.offset_origin(), surface.mirrored());
+            self.ray = Ray::new(kind, surface.offset_origin(), surface.mirrored());
         } else {
             let scale = if self.carried == Carried::Radiance { specular.radiance_scale } else { 1.0 };
             self.throughput *= specular.transmitted * (scale * all / transmitted);
-            self.ray = Ray::new(surface.offset_behind(), specular.behind);
+            self.ray = Ray::new(kind, surface.offset_behind(), specular.behind);
             if specular.is_straight() {
                 self.is_straight = was_straight;
             } else {
@@ -328,7 +338,7 @@ fn punctual_light<M: MemoryPort>(
         return Ok(NONE);
     }
     context.counters.shadow_rays += 1;
-    let ray = Ray { origin: receiver.origin, direction, max_distance: distance * SHORTER };
+    let ray = Ray::of_light(receiver.origin, direction, distance * SHORTER);
     let share = transmittance(context.scene, context.memory, &ray)?;
     if share == Vec3::ZERO {
         return Ok(NONE);

@@ -5,7 +5,7 @@ use photoncard_shared::address::{LineAddress, Structure};
 use photoncard_shared::layout::{Record, Sensor};
 use photoncard_shared::message::{Camera, Fault, FaultCode, FrameParameters, Projection};
 
-use super::{Ray, SceneImage, Surface, read_slot};
+use super::{Ray, RayKind, SceneImage, Surface, read_slot};
 use crate::memory::MemoryPort;
 use crate::vector::{max, max_component, min, unit};
 
@@ -39,21 +39,22 @@ pub fn ray_at(camera: &Camera, [u, v]: [f32; 2], lens: [f32; 2]) -> Ray {
     let [origin, forward, right, up] =
         [camera.origin, camera.forward, camera.right, camera.up].map(Vec3::from_array);
     let plane = || forward + right * x + up * y;
+    let ray = |origin, direction| Ray::new(RayKind::Eye, origin, direction);
     match camera.projection {
-        Projection::Pinhole => Ray::new(origin, unit(plane())),
+        Projection::Pinhole => ray(origin, unit(plane())),
         Projection::ThinLens { right, up, focus } => {
             let [across, along] = lens;
             let offset = Vec3::from_array(right) * across + Vec3::from_array(up) * along;
-            Ray::new(origin + offset, unit(plane() - offset * (1.0 / focus)))
+            ray(origin + offset, unit(plane() - offset * (1.0 / focus)))
         }
-        Projection::Orthographic => Ray::new(origin + right * x + up * y, unit(forward)),
+        Projection::Orthographic => ray(origin + right * x + up * y, unit(forward)),
         Projection::Panorama { angles: [longitude, latitude] } => {
             let (sin, cos) = libm::sincosf(longitude * x);
             let (height, radius) = libm::sincosf(latitude * y);
-            Ray::new(origin, unit((forward * cos + right * sin) * radius + up * height))
+            ray(origin, unit((forward * cos + right * sin) * radius + up * height))
         }
         // Sensors have no rays.
-        Projection::Sensors { .. } => Ray::new(origin, forward),
+        Projection::Sensors { .. } => ray(origin, forward),
     }
 }
 

@@ -3,19 +3,20 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{
-    BLENDS, DOUBLE_SIDED, Material, NO_INSTANCE, Reflectance, Triangle, TriangleId,
+    BLENDS, DOUBLE_SIDED, HIDDEN, LAMP, Material, NO_INSTANCE, Reflectance, Triangle, TriangleId,
 };
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
 use super::materials::read_material;
-use super::{Ray, SceneImage};
+use super::{Ray, RayKind, SceneImage};
 use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};
 
 /// Returns true if a ray hits a triangle at the point with the barycentric coordinates `weights`; false if
-/// the ray passes through a cut-out or a partly covered surface. Partial coverage is decided at random, by a
-/// hash of the ray and the triangle. A one-sided `BLEND` surface other than glass is never hit from behind.
+/// the ray passes through a cut-out or a partly covered surface, or a surface that is not there for rays of
+/// its kind ([`HIDDEN`], [`LAMP`]). Partial coverage is decided at random, by a hash of the ray and the
+/// triangle. A one-sided `BLEND` surface other than glass is never hit from behind.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -28,6 +29,12 @@ pub(super) fn is_met(
     weights: [f32; 3],
 ) -> Result<bool, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
+    let is_lamp = material.flags & LAMP != 0;
+    if is_lamp && (ray.kind == RayKind::Light || is_back(ray, triangle))
+        || material.flags & HIDDEN != 0 && ray.kind == RayKind::Eye
+    {
+        return Ok(false);
+    }
     // Glass always has two sides: a ray inside hits the back.
     let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
     if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && !is_glass && is_back(ray, triangle) {

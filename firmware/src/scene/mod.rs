@@ -52,12 +52,33 @@ pub struct Ray {
     pub direction: Vec3,
     /// Maximum distance from the origin, metres.
     pub max_distance: f32,
+    /// What the ray is cast for.
+    pub kind: RayKind,
+}
+
+/// What a ray is cast for. Some surfaces are there for some kinds of rays alone
+/// ([`HIDDEN`](photoncard_shared::layout::HIDDEN), [`LAMP`](photoncard_shared::layout::LAMP)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayKind {
+    /// The ray of a pixel.
+    Eye,
+    /// Radiance that arrives at a surface.
+    Radiance,
+    /// Light between two points: shadow rays, photons, and tests of what lies between.
+    Light,
 }
 
 impl Ray {
-    /// Ray with infinite maximum distance.
-    pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, max_distance: f32::INFINITY }
+    /// Ray of a kind with infinite maximum distance.
+    #[inline(always)]
+    pub fn new(kind: RayKind, origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, max_distance: f32::INFINITY, kind }
+    }
+
+    /// Ray of light up to a distance, metres.
+    #[inline(always)]
+    pub fn of_light(origin: Vec3, direction: Vec3, max_distance: f32) -> Self {
+        Self { origin, direction, max_distance, kind: RayKind::Light }
     }
 }
 

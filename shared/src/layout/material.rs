@@ -35,7 +35,15 @@ pub const COMPENSATED: u32 = 128;
 /// of the whole slab. The face where light leaves transmits it unchanged.
 pub const PANE: u32 = 256;
 
-const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED | PANE;
+/// Flag of [`Material::flags`]: eye rays pass the surface.
+pub const HIDDEN: u32 = 1 << 11;
+
+/// Flag of [`Material::flags`]: a lamp without substance. Shadow rays and photons pass it, and so does any ray
+/// from behind. Rays that gather radiance meet its front.
+pub const LAMP: u32 = 1 << 12;
+
+const FLAGS: u32 =
+    DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED | PANE | HIDDEN | LAMP;
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
@@ -44,7 +52,7 @@ const GROUP_SHIFT: u32 = 9;
 const GROUP_MASK: u32 = MAX_LIGHT_GROUPS as u32 - 1;
 /// Position, in the flags word, of the lowest bit of the layers field. The field holds the index of the
 /// [`super::Layers`] plus 1; 0 stands for no layers.
-const LAYERS_SHIFT: u32 = 11;
+const LAYERS_SHIFT: u32 = 13;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
@@ -63,7 +71,7 @@ pub struct Material {
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
     /// Combination of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`],
-    /// [`COMPENSATED`] and [`PANE`].
+    /// [`COMPENSATED`], [`PANE`], [`HIDDEN`] and [`LAMP`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: a triangle with cut-outs is absent where alpha, the product of base texture and
     /// vertex alpha, is below `cutoff`. With [`BLENDS`], coverage is `cutoff` times alpha.
@@ -71,7 +79,7 @@ pub struct Material {
     /// Indices of three textures: base colour or diffuse albedo; metallic-roughness, with roughness in green
     /// and metalness in blue; emission. [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
-    /// Index of the material's [`super::Layers`], below 2^21 - 1; `None` without layers.
+    /// Index of the material's [`super::Layers`], below 2^19 - 1; `None` without layers.
     pub layers: Option<u32>,
     /// Light group of the emission, below [`MAX_LIGHT_GROUPS`].
     pub light_group: u8,
@@ -227,7 +235,7 @@ mod tests {
                 roughness: 0.4,
             },
         ] {
-            for flags in [0, FLAGS].into_iter().chain((0..9).map(|bit| FLAGS & 1 << bit)) {
+            for flags in [0, FLAGS].into_iter().chain((0..13).map(|bit| FLAGS & 1 << bit)) {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],

@@ -93,7 +93,7 @@ fn mean_of_alone(group: &str, settings: &RenderSettings) -> f64 {
     for material in &mut scene.materials {
         let is_on = match &*material.name {
             "lamp" => has("key"),
-            "screen" => has("rest"),
+            "screen" | "panel" => has("rest"),
             _ => true,
         };
         material.emission *= if is_on { 1.0 } else { 0.0 };

@@ -25,6 +25,7 @@ mod instances;
 mod irradiance;
 mod irradiance_cache;
 mod kept_records;
+mod lamps;
 mod layers;
 mod light_groups;
 mod light_tree;

@@ -43,7 +43,7 @@ pub(super) fn all_on_way(
     if length == 0.0 {
         return Ok(Vec::new());
     }
-    let ray = Ray { origin: from, direction: (to - from) / length, max_distance: length };
+    let ray = Ray::of_light(from, (to - from) / length, length);
     let (mut all, mut limit) = (Vec::new(), MANY_HITS);
     for_each_hit(scene, &mut memory, &ray, |hit| {
         all.push(Met::new(&hit));

@@ -5,8 +5,8 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_scene::{Layers, Material, NO_ATTRIBUTES, NormalMap, Reflection, Scene, Transmission};
 use photoncard_shared::layout::{
-    self, BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, NARROW_LOBE, NO_TEXTURE, Record,
-    Reflectance, THIN_WALLED,
+    self, BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, HIDDEN, LAMP, LayerTexture, NARROW_LOBE,
+    NO_TEXTURE, Record, Reflectance, THIN_WALLED,
 };
 
 use crate::light::Lights;
@@ -73,6 +73,8 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::M
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
     flags |= if material.energy_compensation { COMPENSATED } else { 0 };
+    flags |= if material.visibility.camera { 0 } else { HIDDEN };
+    flags |= if material.visibility.light { 0 } else { LAMP };
     if transmission.is_some_and(|transmission| !transmission.is_volume) {
         flags |= THIN_WALLED;
     }

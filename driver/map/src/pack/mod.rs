@@ -186,7 +186,10 @@ fn write(scene: &Scene, lights: &Lights, identified: Option<&Identified>) -> Res
     let uncovered = scene.uncovered_materials();
     let glazing = Glazing::new(scene);
     let flat_glass = glazing.is_flat(scene);
-    let cut_out = glazing.of_materials(&uncovered);
+    let passed = scene.materials.iter().map(|material| !material.visibility.is_whole());
+    let passed: Vec<bool> =
+        uncovered.iter().zip(passed).map(|(uncovered, passed)| uncovered | passed).collect();
+    let cut_out = glazing.of_materials(&passed);
     let content =
         Content { triangles: &glazing.triangles, groups: &scene.groups, instances: &scene.instances };
     let hierarchy = bvh::build(content, Finishes { cut_out: &cut_out, flat_glass: &flat_glass })?;

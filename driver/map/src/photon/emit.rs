@@ -14,7 +14,7 @@ use photoncard_firmware::scene::light::{
     EmitterPoint, ProfileFrame, disk_direction, emitter_point, environment_direction, environment_radiance,
     falloff, profile_intensity, read_emitter,
 };
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit};
+use photoncard_firmware::scene::{Ray, RayKind, SceneImage, Surface, closest_hit};
 use photoncard_shared::layout::{Emitter, EmitterKind};
 use photoncard_shared::message::Fault;
 
@@ -300,7 +300,7 @@ fn from_point(
 ) -> Option<Emission> {
     let Aim { towards, measure } =
         if way.is_aimed { way.targets.direction(position, square)? } else { directions.aim(square) };
-    let ray = Ray::new(position, towards);
+    let ray = Ray::new(RayKind::Light, position, towards);
     let emission = Emission { ray, power: intensity(towards) * measure, has_extent: true, light_group: 0 };
     way.balanced(Some(emission), |_| {
         [way.targets.direction_density(position, towards), directions.density(towards)]
@@ -319,7 +319,7 @@ fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Opti
     // A white Lambertian surface has the cosine distribution of the emitter.
     let white = Surface::white(point.position, normal, point.magnitude);
     white.reflector().sample([c, d]).map(|sampled| Emission {
-        ray: Ray::new(white.offset_origin(), sampled.direction),
+        ray: Ray::new(RayKind::Light, white.offset_origin(), sampled.direction),
         power: point.emission * (PI * sides),
         has_extent: true,
         light_group: 0,
@@ -333,7 +333,7 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     let normal = if cosine < 0.0 { -point.normal } else { point.normal };
     let origin = Surface::white(point.position, normal, point.magnitude).offset_origin();
     (cosine > 0.0 || double_sided).then(|| Emission {
-        ray: Ray::new(origin, towards),
+        ray: Ray::new(RayKind::Light, origin, towards),
         power: point.emission * (cosine.abs() * measure),
         has_extent: true,
         light_group: 0,
@@ -357,7 +357,7 @@ fn from_afar(
             let corners = bounds.map(|corner| corner * direction);
             let origin = towards + direction * corners[0].min(corners[1]).element_sum();
             Emission {
-                ray: Ray::new(origin, direction),
+                ray: Ray::new(RayKind::Light, origin, direction),
                 power: irradiance * measure,
                 has_extent: true,
                 light_group: 0,
@@ -379,9 +379,9 @@ fn from_afar(
     // A ray begins outside the scene only if something lies in front of the box, because the precision of a
     // ray falls with its length.
     let origin = emission.ray.origin;
-    let is_open = closest_hit(scene, memory, &Ray::new(origin, -direction))?.is_none();
+    let is_open = closest_hit(scene, memory, &Ray::new(RayKind::Light, origin, -direction))?.is_none();
     let origin = if is_open { origin } else { origin - direction * sources.beyond };
-    Ok(Some(Emission { ray: Ray::new(origin, direction), ..emission }))
+    Ok(Some(Emission { ray: Ray::new(RayKind::Light, origin, direction), ..emission }))
 }
 
 /// Projected areas of a box's faces along a direction, m^2.
@@ -421,5 +421,10 @@ fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f3
     place[(axis + 1) % 3] = across;
     place[(axis + 2) % 3] = d;
     let origin = lower + size * Vec3::from(place);
-    Emission { ray: Ray::new(origin, direction), power: irradiance * area, has_extent: true, light_group: 0 }
+    Emission {
+        ray: Ray::new(RayKind::Light, origin, direction),
+        power: irradiance * area,
+        has_extent: true,
+        light_group: 0,
+    }
 }

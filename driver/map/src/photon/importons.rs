@@ -8,7 +8,7 @@ use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::specular_path::{Arrival, Carried, Passes, SpecularPath};
 use photoncard_firmware::scene::camera::ray_at;
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
+use photoncard_firmware::scene::{Ray, RayKind, SceneImage, Surface, closest_hit, read_surface};
 use photoncard_shared::layout::{Photon, decode_normal, encode_normal};
 use photoncard_shared::message::{Camera, Fault};
 use rayon::prelude::*;
@@ -137,7 +137,7 @@ impl<M: MemoryPort> Walk<'_, M> {
             if !eye.is_above(sampled.direction) {
                 continue;
             }
-            let ray = Ray::new(eye.offset_origin(), sampled.direction);
+            let ray = Ray::new(RayKind::Radiance, eye.offset_origin(), sampled.direction);
             let Some((end, passed)) = self.follow(ray, Passes::NarrowLobes)? else { continue };
             used.extend(importon(&end, throughput * sampled.weight * passed));
         }

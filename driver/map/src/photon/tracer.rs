@@ -4,7 +4,7 @@
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::specular_path::{Arrival, Carried, Passes, SpecularPath};
-use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit, read_surface};
+use photoncard_firmware::scene::{Ray, RayKind, SceneImage, Surface, closest_hit, read_surface};
 use photoncard_shared::layout::{
     FULL_DISC, Photon, PhotonGrid, Rgbe, encode_direction, encode_normal, power_of_two_above,
 };
@@ -152,7 +152,7 @@ impl<'s> Tracer<'s> {
                         None => break,
                     }
                     is_direct = false;
-                    let ray = Ray::new(surface.offset_origin(), sampled.direction);
+                    let ray = Ray::new(RayKind::Light, surface.offset_origin(), sampled.direction);
                     path = SpecularPath::new(ray, Carried::Power, passes);
                 }
             }

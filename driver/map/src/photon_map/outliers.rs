@@ -152,7 +152,7 @@ impl<'a> Map<'a> {
         if length == 0.0 {
             return Ok(true);
         }
-        let ray = Ray { origin: from, direction: (to - from) / length, max_distance: length };
+        let ray = Ray::of_light(from, (to - from) / length, length);
         let (scene, mut memory) = self.scene;
         Ok(closest_hit(&scene, &mut memory, &ray)?.is_none())
     }

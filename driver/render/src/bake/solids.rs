@@ -146,7 +146,7 @@ impl<'p> Solids<'p> {
         let rounding = 64.0 * f32::EPSILON * magnitude(&[sample.position]);
         let origin = sample.position + sample.face * (LIFT * self.texel + rounding);
         let mut lines = self.lines;
-        closest_hit(&self.image, &mut lines, &Ray { origin, direction, max_distance })
+        closest_hit(&self.image, &mut lines, &Ray::of_light(origin, direction, max_distance))
     }
 
     fn is_from_within(&self, hit: &Hit, direction: Vec3) -> bool {

@@ -32,6 +32,7 @@ pub struct Surfaces {
 impl Surfaces {
     /// Collects the surfaces of a scene. Objects of the names `objects` take lightmaps, all if there are no
     /// names, except for glass and for metals without emission, whose light is not that of a diffuse surface.
+    /// What cameras do not see is left out.
     ///
     /// # Errors
     /// If a name is unknown, or nothing takes a lightmap.
@@ -53,9 +54,9 @@ impl Surfaces {
         order.sort_unstable();
         let of_chunk = |chunk: &[(u32, u32, u32)]| {
             let &(object, material, _) = chunk.first()?;
+            let finish = scene.materials.get(material as usize).filter(|finish| finish.visibility.camera)?;
             let is_named = || scene.objects.get(object as usize).is_some_and(|name| objects.contains(name));
-            let is_baked = (objects.is_empty() || is_named())
-                && scene.materials.get(material as usize).is_some_and(is_diffuse);
+            let is_baked = (objects.is_empty() || is_named()) && is_diffuse(finish);
             let triangles = chunk.iter().map(|&(.., index)| index).collect();
             Some(Primitive { object, material, triangles, is_baked })
         };

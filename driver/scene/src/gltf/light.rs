@@ -7,6 +7,8 @@ use serde::Deserialize;
 
 use super::document::Document;
 use super::extras;
+use super::lamps;
+use super::limits::MAX_COORDINATE;
 use super::notices::Notices;
 use crate::error::SceneError;
 use crate::light::DISK_DEGREES;
@@ -67,6 +69,12 @@ impl<'a> LightPlacer<'a> {
             notices.blender_spots.extend(has_penumbra.then(|| name.clone()));
         }
         let kind = self.kind(index, node, world)?;
+        let radius = self.radius(index)?;
+        if radius > 0.0 && matches!(kind, PunctualKind::Point { .. }) {
+            let item = format!("{}.extras.photoncard.radius", place(index));
+            return lamps::place_sphere(self.document, item, (&name, world), (intensity, radius), scene);
+        }
+        notices.lights_without_size.extend((radius > 0.0).then(|| name.clone()));
         let axes = axes(world).unwrap_or_default();
         scene.lights.push(PunctualLight { name, kind, intensity, axes });
         Ok(())
@@ -116,20 +124,35 @@ impl<'a> LightPlacer<'a> {
         })
     }
 
+    /// Values of this renderer in a light's `extras`.
+    fn stated(&self, index: usize) -> Result<Stated, SceneError> {
+        let stated = extras::read(&self.document.lights()[index].extras);
+        Ok(stated.map_err(|reason| self.invalid_extras(index, reason))?.unwrap_or_default())
+    }
+
+    fn invalid_extras(&self, index: usize, reason: String) -> SceneError {
+        let place = format!("{}.extras.photoncard", place(index));
+        let remedy = "state {\"photoncard\": {\"angle\": A}} with the degrees across the light's disk, 0 to 180, \
+                      or {\"photoncard\": {\"radius\": R}} with its metres";
+        self.document.invalid(place, reason, remedy)
+    }
+
     /// Angle across the disk of a directional light, radians: `extras.photoncard.angle`, degrees.
     fn angle(&self, index: usize) -> Result<f32, SceneError> {
-        let invalid = |reason: String| {
-            let place = format!("{}.extras.photoncard", place(index));
-            let remedy =
-                "state {\"photoncard\": {\"angle\": A}} with the degrees across the light's disk, 0 to 180";
-            self.document.invalid(place, reason, remedy)
-        };
-        let stated: Option<Stated> = extras::read(&self.document.lights()[index].extras).map_err(invalid)?;
-        let degrees = stated.and_then(|stated| stated.angle).unwrap_or_default();
+        let degrees = self.stated(index)?.angle.unwrap_or_default();
         if !DISK_DEGREES.contains(&degrees) {
-            return Err(invalid(format!("the angle is {degrees}")));
+            return Err(self.invalid_extras(index, format!("the angle is {degrees}")));
         }
         Ok(degrees.to_radians())
+    }
+
+    /// Radius of a light, metres: `extras.photoncard.radius`.
+    fn radius(&self, index: usize) -> Result<f32, SceneError> {
+        let radius = self.stated(index)?.radius.unwrap_or_default();
+        if !(0.0..=MAX_COORDINATE).contains(&radius) {
+            return Err(self.invalid_extras(index, format!("the radius is {radius}")));
+        }
+        Ok(radius)
     }
 
     /// Cosines of the inner and the outer cone angle of a spot light.
@@ -153,9 +176,10 @@ pub(super) fn axes(world: &DMat4) -> Option<LightAxes> {
 }
 
 /// Values of this renderer in a light's `extras`.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Stated {
     angle: Option<f32>,
+    radius: Option<f32>,
 }
 
 /// Cone of a light, if it is a spot light.

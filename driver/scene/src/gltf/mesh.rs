@@ -29,6 +29,8 @@ pub(super) struct MeshPlacer<'a> {
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
     /// Number of counted copies of each mesh.
     placed: BTreeMap<usize, Copies>,
+    /// Meshes that are not placed as instances.
+    apart: BTreeSet<usize>,
     /// Number of all counted copies.
     counted: u64,
     /// Number of triangles, primitives and copies to be placed; those of a group count once.
@@ -91,6 +93,7 @@ impl<'a> MeshPlacer<'a> {
             source,
             prepared: BTreeMap::new(),
             placed: BTreeMap::new(),
+            apart: BTreeSet::new(),
             counted: 0,
             work: 0,
             grouped: BTreeMap::new(),
@@ -125,6 +128,11 @@ impl<'a> MeshPlacer<'a> {
         Ok(())
     }
 
+    /// Keeps mesh `index` from being placed as instances, whose materials are those of their group.
+    pub(super) fn keep_apart(&mut self, index: usize) {
+        self.apart.insert(index);
+    }
+
     fn too_many(&self) -> SceneError {
         SceneError::TooManyTriangles { file: self.source.document.path.clone(), limit: MAX_TRIANGLES }
     }
@@ -139,7 +147,8 @@ impl<'a> MeshPlacer<'a> {
         for (&mesh, copies) in &self.placed {
             let Some(primitives) = self.prepared.get(&mesh) else { continue };
             let saved = triangles_and_primitives(primitives).saturating_mul(copies.saved());
-            if saved >= MIN_SAVED && primitives.iter().all(is_plain) {
+            let may_be_grouped = saved >= MIN_SAVED && !self.apart.contains(&mesh);
+            if may_be_grouped && primitives.iter().all(is_plain) {
                 let bounds = primitives.iter().map(Primitive::bounds).reduce(Bounds::joined);
                 let centred = bounds.and_then(|bounds| bounds.centre());
                 self.grouped.extend(centred.map(|centre| (mesh, DMat4::from_translation(-centre))));

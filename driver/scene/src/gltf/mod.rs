@@ -20,6 +20,7 @@ mod inside;
 mod instances;
 mod json_scan;
 mod keyframes;
+mod lamps;
 mod layers;
 mod light;
 mod limits;

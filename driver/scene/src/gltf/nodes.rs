@@ -13,6 +13,7 @@ use super::document::Document;
 use super::extent::Anchor;
 use super::extras;
 use super::instances::Instances;
+use super::lamps::AreaLight;
 use super::light::LightPlacer;
 use super::mesh::MeshPlacer;
 use super::names::object_name;
@@ -24,7 +25,7 @@ use super::skin::Skin;
 use super::transform;
 use crate::error::SceneError;
 use crate::light_groups::LightSource;
-use crate::{Camera, LightUnits, Scene};
+use crate::{Camera, LightUnits, Scene, SceneContents};
 
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
@@ -54,6 +55,7 @@ pub(super) fn place(
         profiles: Profiles::new(source),
         skins: BTreeMap::new(),
         worlds: Vec::new(),
+        hidden: BTreeMap::new(),
     };
     scene.is_in_watts = placer.lights.are_in_watts();
     nodes.iter().try_for_each(|(index, world)| placer.count(*index, world, scene))?;
@@ -93,6 +95,10 @@ struct Extras {
     light_group: Option<String>,
     /// Photometric file of the node's light: a path beside the scene, or a data URI.
     ies: Option<String>,
+    /// Area light of the node.
+    area_light: Option<AreaLight>,
+    /// Whether the rays of pixels meet the node's mesh; true if it is not stated.
+    camera: Option<bool>,
 }
 
 /// A source with the light group that is stated for it, if any.
@@ -110,6 +116,8 @@ struct Placer<'a> {
     skins: BTreeMap<usize, Skin>,
     /// World transform of every node; `None` for nodes outside the scene.
     worlds: Vec<Option<DMat4>>,
+    /// Copies of materials, by the index of the material, that eye rays pass.
+    hidden: BTreeMap<u32, u32>,
 }
 
 impl<'a> Placer<'a> {
@@ -117,6 +125,9 @@ impl<'a> Placer<'a> {
     fn count(&mut self, index: usize, world: &DMat4, scene: &mut Scene) -> Result<(), SceneError> {
         let node = &self.source.document.root.nodes[index];
         let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
+        if self.extras(index)?.camera == Some(false) {
+            self.meshes.keep_apart(mesh);
+        }
         // The limit is on the instances' triangles and primitives, of which an empty mesh has none.
         if !self.meshes.has_triangles(mesh, scene)? {
             return Ok(());
@@ -155,16 +166,22 @@ impl<'a> Placer<'a> {
     ) -> Result<(), SceneError> {
         let document = self.source.document;
         let node = &document.root.nodes[index];
-        let Extras { light_group: stated, ies } = self.extras(index)?;
+        let Extras { light_group: stated, ies, area_light, camera } = self.extras(index)?;
+        let [objects, triangles] = [scene.objects.len(), scene.triangles.len()];
         if let Some(mesh) = node.mesh {
-            let object = LightSource::Object(scene.objects.len());
-            scene.stated_light_groups.extend(of_group(&stated, object));
             scene.objects.push(object_name(&document.root, index));
             let weights = self.weights(index, mesh.value());
             match node.skin {
                 Some(skin) => self.place_skinned((mesh.value(), weights), skin.value(), world, scene)?,
                 None => self.place_mesh((mesh.value(), weights), index, world, scene)?,
             }
+            if camera == Some(false) {
+                self.hide(triangles, scene);
+            }
+        }
+        if let Some(light) = area_light {
+            let name = object_name(&document.root, index);
+            light.place(document, index, (&name, &world), scene)?;
         }
         if let Some(camera) = node.camera {
             self.cameras.place(camera.value(), index, &world, scene)?;
@@ -179,7 +196,8 @@ impl<'a> Placer<'a> {
             }
         }
         self.profiles.place(index, &world, scene)?;
-        let added = (lights..scene.lights.len()).map(LightSource::Light);
+        let objects = (objects..scene.objects.len()).map(LightSource::Object);
+        let added = objects.chain((lights..scene.lights.len()).map(LightSource::Light));
         scene.stated_light_groups.extend(added.filter_map(|light| of_group(&stated, light)));
         Ok(())
     }
@@ -188,10 +206,23 @@ impl<'a> Placer<'a> {
     fn extras(&self, index: usize) -> Result<Extras, SceneError> {
         let document = self.source.document;
         let stated = extras::read(&document.root.nodes[index].extras).map_err(|reason| {
-            let remedy = r#"state texts, such as {"photoncard": {"light_group": "key", "ies": "lamp.ies"}}"#;
+            let remedy = r#"docs/extras.md has the keys, such as {"photoncard": {"light_group": "key"}}"#;
             document.invalid(format!("nodes[{index}].extras.photoncard"), reason, remedy)
         })?;
         Ok(stated.unwrap_or_default())
+    }
+
+    /// Gives the triangles from index `first` on copies of their materials, which eye rays pass.
+    fn hide(&mut self, first: usize, scene: &mut Scene) {
+        let SceneContents { triangles, materials, .. } = &mut **scene;
+        for triangle in &mut triangles[first..] {
+            triangle.material = *self.hidden.entry(triangle.material).or_insert_with_key(|&material| {
+                let mut copy = materials[material as usize].clone();
+                copy.visibility.camera = false;
+                materials.push(copy);
+                (materials.len() - 1) as u32
+            });
+        }
     }
 
     /// Weights of the morph targets of a node's mesh: those of the pose, else of the node, else of the mesh.

@@ -37,6 +37,8 @@ pub(super) struct Notices {
     pub(super) clamped_spots: Vec<String>,
     /// Names of spot lights that are left out, because their outer cone angle is not above 0.
     pub(super) closed_spots: Vec<String>,
+    /// Names of lights other than point lights for which the file states a radius.
+    pub(super) lights_without_size: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
     /// Kind of the default camera, in a file without cameras.
@@ -160,6 +162,8 @@ impl Notices {
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         let closed = "spot lights whose outer cone has no angle are left out";
         note(closed, "light", &self.closed_spots);
+        let points = "the radius of lights is ignored that are no point lights";
+        note(points, "light", &self.lights_without_size);
         sentences
     }
 

@@ -10,6 +10,7 @@ mod framing;
 mod glass;
 mod instances;
 mod ktx2;
+mod lamps;
 mod layers;
 mod loading;
 mod materials;

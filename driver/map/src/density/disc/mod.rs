@@ -485,7 +485,7 @@ impl<'a> Meter<'a> {
         if self.is_complete {
             return Ok(self.surroundings.first_on_way(origin, direction, max_distance));
         }
-        let ray = Ray { origin, direction, max_distance };
+        let ray = Ray::of_light(origin, direction, max_distance);
         let Searcher { scene, memory, .. } = &self.searcher;
         Ok(first_triangle(scene, *memory, &ray)?.map(|Met { distance, normal, .. }| {
             (distance, if normal.dot(direction) > 0.0 { -normal } else { normal })
