@@ -19,7 +19,7 @@ use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface, transmittance};
+use photoncard_firmware::scene::{Ray, RayKind, Surface, closest_hit, read_surface, transmittance};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::{Radiance, Tile};
@@ -94,12 +94,12 @@ impl Prepared {
             .filter_map(|i| {
                 let [x, y] = [random(i, 1) - 0.5, random(i, 2) - 0.5];
                 let direction = (camera.forward + camera.right * x + camera.up * y).normalize();
-                let eye = Ray::new(camera.origin, direction);
+                let eye = Ray::new(RayKind::Radiance, camera.origin, direction);
                 let hit = closest_hit(&scene, &mut memory, &eye).expect("sound")?;
                 let mut surface = Surface::NOWHERE;
                 read_surface(&scene, &mut memory, &eye, &hit, &|_| 0.0, &mut surface).expect("sound");
                 let sampled = surface.reflector().sample([random(i, 3), random(i, 4)])?;
-                Some(Ray::new(surface.offset_origin(), sampled.direction))
+                Some(Ray::new(RayKind::Radiance, surface.offset_origin(), sampled.direction))
             })
             .take(count as usize)
             .collect()

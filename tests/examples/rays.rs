@@ -18,7 +18,7 @@ use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    BUNDLE_RAYS, Ray, SceneImage, Surface, closest_hit, closest_hits, read_surface, transmittance,
+    BUNDLE_RAYS, Ray, RayKind, SceneImage, Surface, closest_hit, closest_hits, read_surface, transmittance,
     transmittances,
 };
 use photoncard_shared::address::Structure;
@@ -47,7 +47,7 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<
     let mut bounce = |i: u32| {
         let direction =
             camera.forward + camera.right * (random(i, 1) - 0.5) + camera.up * (random(i, 2) - 0.5);
-        let eye = Ray::new(camera.origin, direction.normalize());
+        let eye = Ray::new(RayKind::Radiance, camera.origin, direction.normalize());
         let hit = closest_hit(&image, &mut memory, &eye).expect("sound")?;
         let mut surface = Surface::NOWHERE;
         read_surface(&image, &mut memory, &eye, &hit, &|_| 0.0, &mut surface).expect("sound");
@@ -55,7 +55,7 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<
         let ray = |ray: u32| {
             let within = [0, 1].map(|axis| (cell[axis] + random(i, 5 + 2 * ray + axis as u32)) / CELLS[axis]);
             let sampled = surface.reflector().sample(within)?;
-            Some(Ray::new(surface.offset_origin(), sampled.direction))
+            Some(Ray::new(RayKind::Radiance, surface.offset_origin(), sampled.direction))
         };
         (0..bundle).map(ray).collect::<Option<Vec<Ray>>>()
     };

@@ -20,7 +20,7 @@ use crate::memory::Lines;
 use crate::render::final_gather::{self, GatherRayEnds};
 use crate::render::{Context, GatherPoint, PixelSample};
 use crate::scene::{
-    BUNDLE_RAYS, PartialReflection, Ray, SceneImage, Seen, Surface, closest_hits, transmittances,
+    BUNDLE_RAYS, PartialReflection, Ray, RayKind, SceneImage, Seen, Surface, closest_hits, transmittances,
 };
 
 fn scene() -> SceneImage {
@@ -153,7 +153,7 @@ fn one_ray_too_many_for_a_bundle_is_a_fault() {
             final_gather::cast(context, point, target, 0..rays as u32, &mut GatherRayEnds::new())
         });
         assert_eq!(gathered, expected);
-        let bundle = &[Ray::new(Vec3::ZERO, Vec3::Y); BUNDLE_RAYS + 1][..rays];
+        let bundle = &[Ray::new(RayKind::Light, Vec3::ZERO, Vec3::Y); BUNDLE_RAYS + 1][..rays];
         let hit = in_empty_scene(|context, _| {
             closest_hits(context.scene, context.memory, bundle, &mut [None; BUNDLE_RAYS])
         });

@@ -239,11 +239,12 @@ fn cross_exact([ax, ay]: [f32; 2], [bx, by]: [f32; 2]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::RayKind;
 
     const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
     fn meet(origin: [f32; 3], direction: [f32; 3]) -> Option<Intersection> {
-        let ray = Ray::new(origin.into(), Vec3::from(direction).normalize());
+        let ray = Ray::new(RayKind::Radiance, origin.into(), Vec3::from(direction).normalize());
         RayFrame::new(&ray).intersect(&TRIANGLE, ray.max_distance)
     }
 
@@ -270,7 +271,7 @@ mod tests {
             let t = (i as f32 + 100.0) / 20_200.0;
             let target = Vec3::from(quad[0]) * (1.0 - t) + Vec3::from(quad[2]) * t;
             let origin = Vec3::new(0.3, -0.2 + t, 4.0 - t);
-            let ray = Ray::new(origin, (target - origin).normalize());
+            let ray = Ray::new(RayKind::Radiance, origin, (target - origin).normalize());
             let frame = RayFrame::new(&ray);
             assert!(halves.iter().any(|half| frame.intersect(half, f32::INFINITY).is_some()), "{t}");
         }

@@ -33,6 +33,13 @@ pub(super) struct Settled {
     pub(super) provenance: NamedSettings,
 }
 
+/// Work of the painter.
+pub(super) enum Job {
+    /// Reads the scene's files again.
+    Reload,
+    Pass(Box<Task>),
+}
+
 /// State of a view that all threads share.
 pub(super) struct Hub {
     view: Mutex<View>,
@@ -90,17 +97,21 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Waits for the next pass to render; `None` when the view is over.
-    pub(super) fn next_task(&self) -> Option<Task> {
+    /// Waits for the next work of the painter; `None` when the view is over.
+    pub(super) fn next_job(&self) -> Option<Job> {
         /// Interval of checks whether the view is over: a signal does not notify the condition variable.
         const ATTENTION: Duration = Duration::from_millis(100);
         let mut view = self.lock();
         while !self.is_over() {
             let now = self.start.elapsed();
+            if view.takes_reload() {
+                self.must_stop.store(view.must_stop(), Ordering::Relaxed);
+                return Some(Job::Reload);
+            }
             let wait = match view.next(now) {
                 Ok(task) => {
                     self.must_stop.store(false, Ordering::Relaxed);
-                    return Some(task);
+                    return Some(Job::Pass(Box::new(task)));
                 }
                 Err(until) => until.map_or(ATTENTION, |until| until.saturating_sub(now).min(ATTENTION)),
             };

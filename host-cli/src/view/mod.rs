@@ -53,7 +53,7 @@ use self::request::{MAX_PIXELS, MAX_SIDE, is_size_of_view};
 use self::saving::Folder;
 use self::state::{Start, View};
 use self::wish::{Sketch, Wish};
-use crate::arguments::ViewOptions;
+use crate::arguments::{SceneOptions, ViewOptions};
 use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::input;
@@ -82,7 +82,8 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     let is_over = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
     let listener = listen(options.listen)?;
     let address = listener.local_addr().map_err(|error| Failure::work_error(&error))?;
-    let scene = load(options, &mut settings)?;
+    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX);
+    let scene = load(options, dram_bytes, &mut settings)?;
     let start = Start {
         options: options.scene.clone(),
         quality: options.quality,
@@ -101,7 +102,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     std::thread::spawn(move || server::serve(&listener, &gate, &served));
     std::thread::scope(|scope| {
         scope.spawn(|| look_for_cards(&hub));
-        let painter = Painter::new(&hub, scene, options, denoiser);
+        let painter = Painter::new(&hub, (scene, dram_bytes), options, denoiser);
         let painted = scope.spawn(|| on_threads(options.threads, || painter.run()));
         while !hub.is_over() {
             std::thread::sleep(ATTENTION);
@@ -141,10 +142,8 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
 }
 
 /// Loads the scene, and gives the picture the camera's aspect ratio. Assignments (`--set`) are not applied.
-fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
-    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX);
-    let mut scene = input::load(&options.scene, dram_bytes)?;
-    scene.set_light_groups(&options.scene.light_groups).map_err(Failure::input)?;
+fn load(options: &ViewOptions, dram_bytes: u64, settings: &mut RenderSettings) -> Result<Scene, Failure> {
+    let scene = read(&options.scene, dram_bytes)?;
     settings.picture.light_groups = scene.light_groups.names().to_vec();
     let camera = settings.camera(&scene)?;
     notices::say_ignored(&options.scene, &scene, &Uses::of(&options.scene, &settings.picture, None))?;
@@ -152,6 +151,13 @@ fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, F
     if let Some(notice) = misfit.filter(|_| !options.quiet) {
         say(format_args!("photoncard: {notice}"));
     }
+    Ok(scene)
+}
+
+/// Reads the scene and its light groups. Assignments (`--set`) are not applied.
+fn read(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Failure> {
+    let mut scene = input::load(options, dram_bytes)?;
+    scene.set_light_groups(&options.light_groups).map_err(Failure::input)?;
     Ok(scene)
 }
 

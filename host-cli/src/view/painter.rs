@@ -14,10 +14,13 @@ use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::message::Tile;
 
 use super::canvas::Origin;
+use super::describe::SceneFacts;
 use super::fitting::Fitting;
-use super::hub::{Hub, Settled};
+use super::hub::{Hub, Job, Settled};
+use super::read;
 use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
+use super::wish::Sketch;
 use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
 use crate::render::files::denoised_by;
@@ -26,6 +29,8 @@ use crate::render::files::denoised_by;
 pub(super) struct Painter<'a> {
     hub: &'a Hub,
     options: &'a SceneOptions,
+    /// Memory of the smallest card, bytes.
+    dram_bytes: u64,
     quality: Quality,
     finish: Finish,
     denoiser: Option<&'static Denoiser>,
@@ -43,7 +48,7 @@ impl<'a> Painter<'a> {
     /// Creates the painter of a scene, to which no assignments are applied yet.
     pub(super) fn new(
         hub: &'a Hub,
-        scene: Scene,
+        (scene, dram_bytes): (Scene, u64),
         options: &'a ViewOptions,
         denoiser: Option<&'static Denoiser>,
     ) -> Self {
@@ -51,6 +56,7 @@ impl<'a> Painter<'a> {
         Self {
             hub,
             options: scene_options,
+            dram_bytes,
             quality: *quality,
             finish: options.finish(),
             denoiser,
@@ -65,10 +71,17 @@ impl<'a> Painter<'a> {
     /// Renders until the view is over. A panic also ends the view.
     pub(super) fn run(mut self) {
         let _end = EndOnDrop(self.hub);
-        while let Some(task) = self.hub.next_task() {
+        while let Some(job) = self.hub.next_job() {
             if self.hub.take_card_back() {
                 self.renderer.close_cards();
             }
+            let task = match job {
+                Job::Pass(task) => *task,
+                Job::Reload => {
+                    self.reload();
+                    continue;
+                }
+            };
             let done = self.assign(&task).and_then(|()| match task.work.pass {
                 Pass::Fit => self.fit(&task),
                 Pass::Coarse(_) | Pass::Full => self.render(&task),
@@ -78,6 +91,26 @@ impl<'a> Painter<'a> {
             }
         }
         self.fitting.take().into_iter().for_each(Fitting::stop);
+    }
+
+    /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them, pages
+    /// are told, and the scene stays.
+    fn reload(&mut self) {
+        let scene = match read(self.options, self.dram_bytes) {
+            Ok(scene) => scene,
+            Err(failure) => {
+                let text = format!("the scene is not read again: {}", failure.line());
+                return self.hub.change(|view, _| view.tell_error(&text));
+            }
+        };
+        let parts = (Sketch::new(&scene), SceneFacts::new(input::name(self.options), &scene));
+        match self.hub.change(|view, _| view.replace(parts, scene.light_groups.names())) {
+            Ok(()) => {
+                self.fitting.take().into_iter().for_each(Fitting::stop);
+                (self.scene, self.assigned) = (Arc::new(scene), None);
+            }
+            Err(error) => self.hub.change(|view, _| view.tell_error(&with_remedy(&error))),
+        }
     }
 
     /// Gives the scene the materials and lights that a task's request states.

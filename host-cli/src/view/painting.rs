@@ -40,7 +40,12 @@ impl View {
 
     /// Returns whether the running pass should stop.
     pub(super) fn must_stop(&self) -> bool {
-        self.refinement.must_stop()
+        self.refinement.must_stop() || self.is_outdated
+    }
+
+    /// Returns whether a page has asked for the scene's files to be read again, once for each request.
+    pub(super) fn takes_reload(&mut self) -> bool {
+        std::mem::take(&mut self.is_outdated)
     }
 
     /// Records whether the running pass is preparing: tracing photons and building the card image.

@@ -161,6 +161,11 @@ impl Refinement {
         self.is_refused = false;
     }
 
+    /// Has pilot renders choose settings anew, unless `is_fitted`: no setting is left to them.
+    pub(super) fn fit_again(&mut self, is_fitted: bool) {
+        self.is_fitted = is_fitted;
+    }
+
     /// Records whether the camera is still moving.
     pub(super) fn moves(&mut self, is_moving: bool, now: Duration) {
         self.moving_until = if is_moving { now + REST } else { Duration::ZERO };

@@ -37,6 +37,8 @@ pub(super) enum Request {
     },
     Setting(Setting),
     Reset,
+    /// Read the scene's files again.
+    Reload,
     Layer(Shown),
     Size([u32; 2]),
     Cursor(Option<[u32; 2]>),
@@ -117,6 +119,7 @@ fn request(fields: &Fields) -> Result<Request, Fault> {
         "mix" => Request::Mix { group: fields.text("name")?, gain: gain(fields)? },
         "setting" => Request::Setting(setting(fields)?),
         "reset" => Request::Reset,
+        "reload" => Request::Reload,
         "layer" => Request::Layer(layer(&fields.text("name")?)?),
         "size" => Request::Size(fields.size()?),
         "cursor" if fields.0.get("at") == Some(&Value::Null) => Request::Cursor(None),
@@ -317,6 +320,7 @@ mod tests {
             (r#"{"type":"size","size":[640,480]}"#, Request::Size([640, 480])),
             (r#"{"type":"cursor","at":null}"#, Request::Cursor(None)),
             (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
+            (r#"{"type":"reload"}"#, Request::Reload),
             (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
         ] {
             assert_eq!(parse(text), (Ok(request), None), "{text}");

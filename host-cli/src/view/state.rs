@@ -38,6 +38,13 @@ pub(super) struct Start {
     pub(super) out: Option<String>,
 }
 
+impl Start {
+    /// Returns whether pilot renders have no setting of a picture to choose.
+    fn is_fitted(&self, wish: &Wish) -> bool {
+        wish.states_all() || self.quality == Quality::Paper
+    }
+}
+
 /// Pass to render, with the request that it belongs to and its settings.
 pub(super) struct Task {
     pub(super) work: Work,
@@ -67,6 +74,8 @@ pub(super) struct View {
     /// Sketch with the materials and lights of the first request, which `reset` restores.
     first: Scene,
     pub(super) refinement: Refinement,
+    /// True after a page has asked for the scene's files to be read again.
+    pub(super) is_outdated: bool,
     /// Request of the last complete final picture.
     pub(super) settled: Option<Wish>,
     /// Reason why the newest request cannot be rendered; `None` if it can.
@@ -98,14 +107,14 @@ impl View {
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
         wish.check_cards()?;
-        let is_fitted = wish.states_all() || start.quality == Quality::Paper;
         Ok(Self {
             first: start.sketch.with(&wish)?,
             scene: start.sketch.with(&wish)?,
             cards: CardBoard::new(&wish.settings.cards),
+            refinement: Refinement::new(start.is_fitted(&wish)),
             wish,
             start,
-            refinement: Refinement::new(is_fitted),
+            is_outdated: false,
             settled: None,
             refused: None,
             canvas: Canvas::default(),
@@ -127,14 +136,58 @@ impl View {
         let number = self.next_page;
         self.next_page += 1;
         self.steering.get_or_insert(number);
-        let out = self.start.out.as_deref();
         let mut page = Page::new();
+        page.reply(self.hello(number));
+        self.pages.insert(number, page);
+        number
+    }
+
+    /// First message to a page.
+    fn hello(&self, number: PageNumber) -> String {
+        let out = self.start.out.as_deref();
         let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
         hello["size_stated"] = json!(self.start.is_size_stated);
         hello["light_groups"] = json!(self.wish.settings.picture.light_groups);
-        page.reply(hello.to_string());
-        self.pages.insert(number, page);
-        number
+        hello.to_string()
+    }
+
+    /// Replaces the scene by one that was read again from its files. Edits of pages stay if they are possible
+    /// in it. Pages are greeted anew.
+    ///
+    /// # Errors
+    /// If the picture cannot be rendered of this scene; the view keeps the one before.
+    pub(super) fn replace(
+        &mut self,
+        (sketch, facts): (Sketch, SceneFacts),
+        light_groups: &[String],
+    ) -> Result<(), RenderError> {
+        let with_groups = |wish: &Wish| {
+            let mut wish = wish.clone();
+            wish.settings.picture.light_groups = light_groups.to_vec();
+            wish
+        };
+        let [first, edited] = [&self.start.wish, &self.wish].map(with_groups);
+        let scene_of_first = sketch.with(&first)?;
+        let (wish, scene) = match sketch.with(&edited) {
+            Ok(scene) => (edited, scene),
+            Err(_) => {
+                let wish = edited.without_edits();
+                let scene = sketch.with(&wish)?;
+                (wish, scene)
+            }
+        };
+        if light_groups != self.wish.settings.picture.light_groups {
+            self.set_gains([[1.0; 3]; MAX_LIGHT_GROUPS]);
+        }
+        (self.start.sketch, self.start.facts, self.start.wish) = (sketch, facts, first);
+        (self.first, self.scene, self.wish) = (scene_of_first, scene, wish);
+        (self.refused, self.settled) = (None, None);
+        self.refinement.wish(true);
+        self.refinement.fit_again(self.start.is_fitted(&self.wish));
+        self.begin_picture();
+        let greetings: Vec<_> = self.pages.keys().map(|number| (*number, self.hello(*number))).collect();
+        greetings.into_iter().for_each(|(number, hello)| self.of_page(number, |page| page.reply(hello)));
+        Ok(())
     }
 
     /// Returns whether a page is connected.
@@ -246,6 +299,10 @@ impl View {
                 }
             }
             Request::Mix { group, gain } => return self.mix(&group, gain),
+            Request::Reload => {
+                self.is_outdated = true;
+                return Ok(());
+            }
             Request::Cursor(at) => {
                 self.cursor = at;
                 return Ok(());

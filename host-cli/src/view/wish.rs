@@ -50,6 +50,11 @@ impl Wish {
         &self.edits
     }
 
+    /// Copy of this request without the assignments of pages.
+    pub(super) fn without_edits(&self) -> Self {
+        Self { edits: Vec::new(), ..self.clone() }
+    }
+
     /// Sets position, target and projection of the camera, and whose lens and shift it has.
     pub(super) fn look(&mut self, view: View) {
         let View { camera, position, look_at, shown } = view;

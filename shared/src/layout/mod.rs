@@ -63,8 +63,8 @@ pub use kernel::{encode_kernel, kernel_share};
 pub use layers::{LayerTexture, Layers};
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{
-    BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_ALPHA,
-    NARROW_LOBE, NO_TEXTURE, PANE, Reflectance, THIN_WALLED,
+    BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, HIDDEN, LAMP, MAX_PHONG_EXPONENT, Material,
+    NARROW_ALPHA, NARROW_LOBE, NO_TEXTURE, PANE, Reflectance, THIN_WALLED,
 };
 pub use photon::{
     DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc_fraction, encode_disc, is_of_region,

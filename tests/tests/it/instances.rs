@@ -13,8 +13,8 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    BUNDLE_RAYS, Hit, Ray, SceneImage, Surface, closest_hit, closest_hits, read_surface, transmittance,
-    transmittances,
+    BUNDLE_RAYS, Hit, Ray, RayKind, SceneImage, Surface, closest_hit, closest_hits, read_surface,
+    transmittance, transmittances,
 };
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
@@ -79,7 +79,7 @@ fn rays(count: u32) -> Vec<Ray> {
         let towards = (random_point(index, 23) * Vec3::new(6.0, 2.0, 6.0) - from).normalize();
         Ray {
             max_distance: if index.is_multiple_of(3) { 7.0 } else { f32::INFINITY },
-            ..Ray::new(from, towards)
+            ..Ray::new(RayKind::Radiance, from, towards)
         }
     };
     (0..count).map(ray).collect()
@@ -197,7 +197,7 @@ fn instances_of_any_size_are_hit_as_copies_from_near_and_far() {
         for ray in (0..4000).map(|index| {
             let target = random_point(index, 23) * Vec3::new(6.0, 2.0, 6.0) * scale as f32;
             let towards = random_point(index, 26).normalize();
-            Ray::new(target - towards * (distance * scale) as f32, towards)
+            Ray::new(RayKind::Radiance, target - towards * (distance * scale) as f32, towards)
         }) {
             let hit = closest_hit(&image, &mut memory, &ray).expect("sound");
             let of_copy = closest_hit(&of_copies, &mut memory_of_copies, &ray).expect("sound");

@@ -1,8 +1,10 @@
 //! Irradiance, as a picture, as a layer of illuminance and by sensors, against known values.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use glam::Vec3;
+use photoncard_driver::film::Film;
 use photoncard_driver::layer::Layer;
 use photoncard_driver::render::measure::{Meter, Point, Reading, SENSORS_TOGETHER};
 use photoncard_driver::render::{
@@ -197,6 +199,39 @@ fn readings_depend_on_number_and_place_alone() {
     assert_eq!(meter.measure(0, &points, &Unobserved).unwrap(), expected);
 }
 
+/// Readings and pictures of the scene with every feature on one card, in the order of tiles.
+struct Reference {
+    lit: Scene,
+    points: Vec<Point>,
+    readings: Vec<Reading>,
+    /// Pictures without and with an irradiance cache.
+    films: [Film; 2],
+}
+
+static REFERENCE: LazyLock<Reference> = LazyLock::new(|| {
+    let (lit, base) = (everything(), in_order());
+    let points: Vec<Point> = (0..70)
+        .map(|index| at([0.01 * f64::from(index) - 0.3, 0.1, 0.2], [0.1, 1.0, 0.02 * f64::from(index)]))
+        .collect();
+    let film = |cache| render_or_panic(&lit, &base.clone().with(|s| with_cache(s, cache))).film;
+    let films = [false, true].map(film);
+    Reference { readings: measured(&lit, &base, &points), films, points, lit }
+});
+
+fn in_order() -> RenderSettings {
+    settings().with(|s| {
+        (s.picture.width, s.picture.height) = (13, 11);
+        (s.photons.count, s.integrator.gather_rays, s.photons.neighbors) = (1500, 8, 20);
+        s.photons.caustic_neighbors = 20;
+        s.picture.irradiance = true;
+        s.schedule.order = GatherOrder::Tiled;
+    })
+}
+
+fn with_cache(settings: &mut RenderSettings, cache: bool) {
+    settings.integrator.irradiance_error = cache.then_some(0.2);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
     #[test]
@@ -206,14 +241,7 @@ proptest! {
         tile in 1..9_u32,
         cache: bool,
     ) {
-        let lit = everything();
-        let base = settings().with(|s| {
-            (s.picture.width, s.picture.height) = (13, 11);
-            (s.photons.count, s.integrator.gather_rays, s.photons.neighbors) = (1500, 8, 20);
-            s.photons.caustic_neighbors = 20;
-            s.picture.irradiance = true;
-            s.schedule.order = GatherOrder::Tiled;
-        });
+        let base = in_order();
         let changed = base.clone().with(|s| {
             (s.schedule.order, s.schedule.tile) = (order, Some(tile.min(4)));
             s.cards.addresses = vec![address(cards)];
@@ -221,13 +249,10 @@ proptest! {
                 s.schedule.order = GatherOrder::Sort;
             }
         });
-        let points: Vec<Point> = (0..70)
-            .map(|index| at([0.01 * f64::from(index) - 0.3, 0.1, 0.2], [0.1, 1.0, 0.02 * f64::from(index)]))
-            .collect();
-        prop_assert_eq!(measured(&lit, &changed, &points), measured(&lit, &base, &points));
-        let with_cache = |s: &mut RenderSettings| s.integrator.irradiance_error = cache.then_some(0.2);
-        let [first, second] = [base, changed].map(|s| render_or_panic(&lit, &s.with(with_cache)).film);
-        prop_assert!(first.sums().eq(second.sums()));
+        let Reference { lit, points, readings, films } = &*REFERENCE;
+        prop_assert_eq!(&measured(lit, &changed, points), readings);
+        let film = render_or_panic(lit, &changed.with(|s| with_cache(s, cache))).film;
+        prop_assert!(film.sums().eq(films[usize::from(cache)].sums()));
     }
 }
 

@@ -57,7 +57,7 @@ fn settings() -> RenderSettings {
 
 fn on_floor(scene: &Scene) -> Reading {
     let point = Point { position: [0.1, 0.0, 0.2], normal: [0.0, 1.0, 0.0] };
-    let meter = Meter::new(scene, &settings(), [1.0 / 3.0; 3]);
+    let mut meter = Meter::new(scene, &settings(), [1.0 / 3.0; 3]);
     meter.measure(0, &[point], &Unobserved).expect("measures").remove(0)
 }
 

@@ -7,7 +7,7 @@ use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
 use photoncard_firmware::memory::{Counted, Lines};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    BUNDLE_RAYS, Bundle, ClosestHit, Hit, Passed, Ray, RayFrame, SceneImage, ShadowRay, closest_hit,
+    BUNDLE_RAYS, Bundle, ClosestHit, Hit, Passed, Ray, RayFrame, RayKind, SceneImage, ShadowRay, closest_hit,
     closest_hits, transmittance, transmittances,
 };
 use photoncard_firmware::simd::Level;
@@ -91,7 +91,7 @@ fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
                 _ => (Vec3::new(a.x, origin.y, origin.z), a),
             };
             let max_distance = if i % 5 == 0 { size * random(i, 4) * 10.0 } else { f32::INFINITY };
-            Ray { max_distance, ..Ray::new(origin, unit(target - origin)) }
+            Ray { max_distance, ..Ray::new(RayKind::Radiance, origin, unit(target - origin)) }
         })
         .collect()
 }
@@ -174,7 +174,7 @@ fn no_ray_leaves_a_closed_surface() {
                 2 => a.lerp(b, random(i, 1)),
                 _ => a.lerp(b, random(i, 1)) + random_point(i, 20) * (1e-6 * radius),
             };
-            let ray = Ray::new(origin, (target - origin).normalize());
+            let ray = Ray::new(RayKind::Radiance, origin, (target - origin).normalize());
             assert!(closest_hit(&image, &mut memory, &ray).unwrap().is_some(), "{ray:?} leaves");
             assert_eq!(transmittance(&image, &mut memory, &ray).unwrap(), Vec3::ZERO, "{ray:?} leaves");
         }
@@ -198,16 +198,21 @@ fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
                 let place =
                     [random(index, 5), random(index, 6) + 0.002 * ray as f32].map(|at| 2.0 * at - 1.0);
                 let direction = camera.forward + camera.right * place[0] + camera.up * place[1];
-                Ray::new(camera.origin, direction.normalize())
+                Ray::new(RayKind::Radiance, camera.origin, direction.normalize())
             })
             .collect(),
         1 => (0..count)
             .map(|ray| {
                 let way = to + across(ray) * 0.2 - from;
-                Ray { max_distance: way.length() * 0.999, ..Ray::new(from, way.normalize_or(Vec3::Y)) }
+                Ray {
+                    max_distance: way.length() * 0.999,
+                    ..Ray::new(RayKind::Radiance, from, way.normalize_or(Vec3::Y))
+                }
             })
             .collect(),
-        2 => (0..count).map(|ray| Ray::new(from, across(ray).normalize_or(Vec3::X))).collect(),
+        2 => (0..count)
+            .map(|ray| Ray::new(RayKind::Radiance, from, across(ray).normalize_or(Vec3::X)))
+            .collect(),
         _ => rays(triangles, of(count)).split_off(of(0) as usize),
     }
 }

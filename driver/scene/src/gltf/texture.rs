@@ -185,6 +185,7 @@ fn renumber(material: &mut Material, indices: &[Option<u32>]) {
         metallic_roughness_texture,
         emissive_texture,
         layers,
+        visibility: _,
     } = material;
     for texture in [base_texture, metallic_roughness_texture, emissive_texture] {
         *texture = texture.and_then(|index| indices[index as usize]);

@@ -6,13 +6,7 @@ use glam::Vec3;
 use photoncard_scene::{Scene, Triangle, Visibility};
 use serde_json::{Value, json};
 
-use crate::support::{load_changed, push};
-
-fn add_node(json: &mut Value, node: Value) {
-    let index = json["nodes"].as_array().unwrap().len();
-    push(&mut json["nodes"], node);
-    push(&mut json["scenes"][0]["nodes"], json!(index));
-}
+use crate::support::{add_node, load_changed};
 
 /// Scene with a node `softbox` of an area light.
 fn softbox(light: &Value, node: &Value) -> Scene {

@@ -11,7 +11,7 @@ use photoncard_scene::{LightProfile, PunctualKind, PunctualLight, Scene};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::support::{load_changed, push};
+use crate::support::{add_node, load_changed};
 
 /// Angles and intensities of a file of LM-63.
 struct Table {
@@ -336,11 +336,6 @@ fn data_uri() -> String {
 }
 
 /// Adds a node with this content to the scene's nodes.
-fn add_node(json: &mut Value, node: Value) {
-    let index = push(json, "nodes", node);
-    json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
-}
-
 #[test]
 fn lights_of_the_extension_have_the_files_candelas_and_their_nodes_axes() {
     let half = std::f32::consts::FRAC_1_SQRT_2;

@@ -177,6 +177,13 @@ pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
     list.len() - 1
 }
 
+/// Adds a node to the scene.
+#[allow(dead_code, reason = "not every test file adds one")]
+pub(crate) fn add_node(json: &mut Value, node: Value) {
+    let index = push(json, "nodes", node);
+    json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
+}
+
 /// Loads a file with these bytes.
 #[allow(dead_code, reason = "not every test file loads raw bytes")]
 pub(crate) fn load_bytes(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {

@@ -174,6 +174,52 @@ fn a_quality_finds_the_settings_of_the_settled_picture() {
     assert!(room.read("b.exr") == room.read("a.exr"), "{}", state["command"]);
 }
 
+/// The scene is that of the changed file, its pilot renders are repeated, and an edit that it has no use for is
+/// dropped.
+#[test]
+#[cfg(unix)]
+fn a_scene_that_is_read_again_settles_to_the_picture_of_its_command() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    room.write_scene("scene.gltf", &scene());
+    let options = ["--size", "20x12", "--quality", "draft", "--out", "out", "--card", "emulated:1"];
+    let view = View::start(&room, "scene.gltf", &options);
+    let mut page = view.connect();
+    page.settle();
+    page.send(&json!({"type": "set", "name": "floor.diffuse", "value": [0.7, 0.2, 0.1]}));
+    page.wait("state", |state| state["settled"] == true && state["changes"] != json!([]));
+    let mut changed = scene();
+    changed["materials"][0]["name"] = json!("ground");
+    changed["nodes"][0]["scale"] = json!([1.0, 0.5, 2.0]);
+    room.write_scene("scene.gltf", &changed);
+    page.send(&json!({"type": "reload"}));
+    let hello = page.wait_for("hello");
+    assert_eq!(hello["scene"]["materials"][0]["name"], "ground");
+    let state = page.settle();
+    assert_eq!(state["changes"], json!([]));
+    page.send(&json!({"type": "save", "name": "a.exr"}));
+    page.wait_for("saved");
+    let plain = ["render", "scene.gltf", "--size", "20x12", "--quality", "draft", "-o", "a.exr"];
+    assert_eq!(room.run(&plain).status, Some(0));
+    assert!(room.read("out/a.exr") == room.read("a.exr"), "{}", state["command"]);
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_again_stays() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    room.write("scene.gltf", "{");
+    page.send(&json!({"type": "reload"}));
+    let error = page.wait_for("error");
+    assert!(error["text"].as_str().unwrap().contains("scene.gltf"), "{error}");
+    page.send(&camera(0.2, false));
+    let state =
+        page.wait("state", |state| state["settled"] == true && state["camera"]["position"][0] == json!(0.2));
+    assert_eq!(state["refused"], json!(null));
+}
+
 #[test]
 fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
     let room = Room::new();

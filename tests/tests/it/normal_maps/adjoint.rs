@@ -11,7 +11,7 @@ use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::Context;
 use photoncard_firmware::render::specular_path::{Carried, Passes, PathEnd, SpecularPath};
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface};
+use photoncard_firmware::scene::{Ray, RayKind, Surface, closest_hit, read_surface};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::layout::{Photon, decode_direction};
 use photoncard_tests::shapes::{add_tangents, add_textured_quad};
@@ -87,7 +87,11 @@ fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 
     let (sine, cosine) = (std::f32::consts::PI * u).sin_cos();
     let radius = v.sqrt();
     let direction = Vec3::new(-radius * sine, (1.0 - v).sqrt(), radius * cosine);
-    let mut path = SpecularPath::new(Ray::new(origin, direction), Carried::Radiance, Passes::NarrowLobes);
+    let mut path = SpecularPath::new(
+        Ray::new(RayKind::Radiance, origin, direction),
+        Carried::Radiance,
+        Passes::NarrowLobes,
+    );
     let Some(mut hit) = closest_hit(context.scene, context.memory, &path.ray).unwrap() else { return 0.0 };
     let mut surface = Surface::NOWHERE;
     read_surface(context.scene, context.memory, &path.ray, &hit, &|_| 0.0, &mut surface).unwrap();
