@@ -10,8 +10,8 @@ use super::materials::read_material;
 use super::triangles::read_triangle;
 use crate::memory::MemoryPort;
 
-/// Returns true if a triangle has no cut-out at the point `place`, metres, and is no lamp without substance. A
-/// point off the triangle's plane is projected onto it.
+/// Returns true if a triangle has no cut-out at the point `place`, metres, and is no lamp without substance.
+/// A point off the triangle's plane is projected onto it.
 ///
 /// # Errors
 /// If the card image is invalid.

@@ -93,8 +93,8 @@ impl<'a> Painter<'a> {
         self.fitting.take().into_iter().for_each(Fitting::stop);
     }
 
-    /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them, pages
-    /// are told, and the scene stays.
+    /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them,
+    /// pages are told, and the scene stays.
     fn reload(&mut self) {
         let scene = match read(self.options, self.dram_bytes) {
             Ok(scene) => scene,

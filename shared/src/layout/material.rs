@@ -38,8 +38,8 @@ pub const PANE: u32 = 256;
 /// Flag of [`Material::flags`]: eye rays pass the surface.
 pub const HIDDEN: u32 = 1 << 11;
 
-/// Flag of [`Material::flags`]: a lamp without substance. Shadow rays and photons pass it, and so does any ray
-/// from behind. Rays that gather radiance meet its front.
+/// Flag of [`Material::flags`]: a lamp without substance. Shadow rays and photons pass it, and so does any
+/// ray from behind. Rays that gather radiance meet its front.
 pub const LAMP: u32 = 1 << 12;
 
 const FLAGS: u32 =

@@ -23,8 +23,8 @@ fn level(centre: Vec3, looks_up: bool, material: u32) -> [photoncard_driver::sce
     quad(if looks_up { [a, b, c, d] } else { [d, c, b, a] }, material)
 }
 
-/// A floor at height 0, and a panel of a finish above it that looks down. The camera looks down from above the
-/// panel.
+/// A floor at height 0, and a panel of a finish above it that looks down. The camera looks down from above
+/// the panel.
 fn below_panel(visibility: Visibility, emission: f32) -> Scene {
     let panel = Material { emission: Vec3::splat(emission), visibility, ..lambertian("panel", 0.0) };
     let smooth = Reflection::MetallicRoughness {

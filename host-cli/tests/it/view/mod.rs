@@ -174,8 +174,8 @@ fn a_quality_finds_the_settings_of_the_settled_picture() {
     assert!(room.read("b.exr") == room.read("a.exr"), "{}", state["command"]);
 }
 
-/// The scene is that of the changed file, its pilot renders are repeated, and an edit that it has no use for is
-/// dropped.
+/// The scene is that of the changed file, its pilot renders are repeated, and an edit that it has no use for
+/// is dropped.
 #[test]
 #[cfg(unix)]
 fn a_scene_that_is_read_again_settles_to_the_picture_of_its_command() {
