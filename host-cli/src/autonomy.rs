@@ -19,8 +19,8 @@ const ILLUMINANCE: &str = "illuminance_lx";
 /// Counts the hours in which each point has the threshold, and prints the share of points that have enough.
 pub(crate) fn run(options: &AutonomyOptions) -> Result<(), Failure> {
     let AutonomyOptions { tables, threshold, share, output } = options;
-    if !(threshold.is_finite() && (0.0..=1.0).contains(share)) {
-        let help = "an illuminance is a number of lux, and a share is 0 to 1";
+    if !(0.0..=f64::MAX).contains(threshold) || !(0.0..=1.0).contains(share) {
+        let help = "an illuminance is a number of lux, 0 or more, and a share is 0 to 1";
         return Err(refusal("the threshold or the share is not possible".to_owned(), help));
     }
     let inputs: Vec<(&Path, &'static str)> = tables.iter().map(|path| (path.as_path(), "a table")).collect();
@@ -94,6 +94,10 @@ fn add_hour(
         }
         points[count].reached += usize::from(illuminance >= threshold);
         count += 1;
+    }
+    if count == 0 {
+        let text = format!("{} has no points", path.display());
+        return Err(refusal(text, "give tables that photoncard measure has written"));
     }
     if count < points.len() {
         let text =

@@ -76,6 +76,14 @@ impl Failure {
         }
     }
 
+    /// Replaces the text of an interrupt, which says what it leaves behind.
+    pub(crate) fn stopped_as(self, text: &'static str) -> Self {
+        match self {
+            Self::Stopped(_) => Self::Stopped(text),
+            other => other,
+        }
+    }
+
     pub(crate) fn status(&self) -> ExitCode {
         ExitCode::from(self.code())
     }

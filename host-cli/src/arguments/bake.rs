@@ -35,7 +35,7 @@ pub(crate) struct BakeOptions {
     #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "exr", "rgbm"])]
     pub(crate) part: Option<Part>,
     /// Put together the files of all parts instead of measuring
-    #[arg(long, value_name = "PART", num_args = 1.., conflicts_with = "farm")]
+    #[arg(long, value_name = "PART", num_args = 1.., conflicts_with = "farm", value_parser = part_file)]
     pub(crate) merge: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) job: JobOptions,
@@ -52,6 +52,13 @@ pub(crate) struct BakeOptions {
     /// Form in which progress and a failure are reported
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,
+}
+
+/// Parses the path of a part. The option takes all words behind it, so that a scene there is a mistake.
+fn part_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_scene = path.extension().is_some_and(|ending| ending == "gltf" || ending == "glb");
+    if is_scene { Err("it is a scene; name the scene before --merge".into()) } else { Ok(path) }
 }
 
 #[derive(Args)]

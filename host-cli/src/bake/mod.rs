@@ -35,6 +35,7 @@ pub(crate) fn run(options: &BakeOptions) -> Result<(), Failure> {
         notices::say_remarks(&options.scene.path, &scene);
     }
     on_threads(options.threads, || bake(options, &scene, &settings))?
+        .map_err(|failure| failure.stopped_as("stopped; no lightmap was written"))
 }
 
 /// Prints the job that bakes on a farm, in parts.

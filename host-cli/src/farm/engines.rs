@@ -12,7 +12,7 @@ pub(super) fn parallel(job: &Job) -> String {
     let functions = functions(job, "");
     format!(
         r#"#!/bin/sh
-# Renders {name} by GNU parallel, $JOBS tasks at once (1 if it is not set). Another run of the script goes on with what is done.
+# Runs the job {name} by GNU parallel, $JOBS tasks at once (1 if it is not set). Another run of the script goes on with what is done.
 set -eu
 job=$(realpath "$0")
 export job
@@ -84,7 +84,7 @@ pub(super) fn slurm(job: &Job) -> String {
         r#"#!/bin/sh
 #SBATCH --requeue
 #SBATCH --open-mode=append
-# Renders {name} by Slurm: `sh SCRIPT` submits it, with further options of sbatch behind. A task that fails or is killed is queued
+# Runs the job {name} by Slurm: `sh SCRIPT` submits it, with further options of sbatch behind. A task that fails or is killed is queued
 # again, and goes on with what is done.
 set -eu
 job=$(realpath "$0")

@@ -81,7 +81,7 @@ fn script(job: &Job) -> String {
 set -eu
 cd "$PHOTONCARD_HOME"
 {}
-# Renders the parts A-B, of the frames C-D if there are any.
+# Works on the parts A-B, of the frames C-D if there are any.
 render() {{
     number=${{1%%-*}}
     while [ "$number" -le "${{1##*-}}" ]; do

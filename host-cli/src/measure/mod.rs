@@ -45,7 +45,8 @@ pub(crate) fn run(options: &MeasureOptions) -> Result<(), Failure> {
         .map_err(|error| Failure::work_error(&error))?
         .in_form(options.progress, Phase::Tiles);
     let meter = Meter::new(&scene, &settings, photometry.weights);
-    let summary = on_threads(options.threads, || measure(options, source, meter, photometry, &progress))??;
+    let summary = on_threads(options.threads, || measure(options, source, meter, photometry, &progress))?
+        .map_err(|failure| failure.stopped_as("stopped; no table was written"))?;
     progress.finish();
     if !options.quiet {
         summary.say(&photometry);

@@ -48,6 +48,7 @@ fn tables_of_other_points_are_refused_by_line() {
         (table([1.0, 2.0]).replace("illuminance_lx", "lux"), "names no column illuminance_lx"),
         (table([1.0, f64::NAN]), "line 3: \"NaN\" is no illuminance"),
         ("x,y,z,nx,ny,nz,illuminance_lx\n1,2\n".to_owned(), "cannot read the table"),
+        ("x,y,z,nx,ny,nz,illuminance_lx\n".to_owned(), "other.csv has no points"),
     ] {
         room.write("other.csv", &text);
         let outcome = room.run(&["autonomy", "hour0.csv", "other.csv", "-o", "out.csv"]);
@@ -55,7 +56,7 @@ fn tables_of_other_points_are_refused_by_line() {
         assert!(outcome.stderr.contains(reason), "{}", outcome.stderr);
         assert!(!room.path("out.csv").exists());
     }
-    for options in [&["--share", "1.5"][..], &["--threshold", "nan"], &["none.csv"], &["-o", "hour0.csv"]] {
+    for options in [&["--share", "1.5"][..], &["--threshold", "-1"], &["none.csv"], &["-o", "hour0.csv"]] {
         let outcome = room.run(&[&["autonomy", "hour0.csv"], options].concat());
         assert_eq!(outcome.status, Some(2), "{options:?}: {}", outcome.stderr);
     }
