@@ -168,9 +168,10 @@ class _Reader:
         unpacker = zlib.decompressobj()
         try:
             packed = unpacker.decompress(data, size)
+            more = b"" if unpacker.eof else unpacker.decompress(unpacker.unconsumed_tail, 1)
         except zlib.error as reason:
             self._refuse(f"a block is damaged ({reason})")
-        if len(packed) != size or not unpacker.eof and unpacker.decompress(unpacker.unconsumed_tail, 1):
+        if len(packed) != size or more:
             self._refuse("a block has another size than its rows")
         return _unpredicted(packed)
 
