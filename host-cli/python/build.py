@@ -20,6 +20,7 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from typing import Optional
 
 from elf import needs_of
 
@@ -50,18 +51,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("binary", type=Path, help="the command, built with --features study")
     parser.add_argument("out", type=Path, help="folder of the wheel")
+    parser.add_argument("--licences", type=Path, help="texts of the licences of the crates in the command")
     arguments = parser.parse_args()
     try:
-        print(build(arguments.binary, arguments.out))
+        print(build(arguments.binary, arguments.out, arguments.licences))
     except (OSError, ValueError) as reason:
         sys.exit(f"{sys.argv[0]}: {reason}")
 
 
-def build(binary: Path, out: Path) -> Path:
+def build(binary: Path, out: Path, licences: Optional[Path] = None) -> Path:
     """Writes the wheel, whole or not at all."""
     version, tag = _version(), tag_of(binary)
     name = f"photoncard-{version}"
-    content = _wheel(_files(binary, name, version, tag), name, _date())
+    files = _files(binary, name, version, tag)
+    if licences is not None:
+        files[f"{name}.dist-info/licenses/LICENSES-OF-CRATES.txt"] = licences.read_bytes()
+    content = _wheel(files, name, _date())
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{name}-{tag}.whl"
     part = path.with_name(f".{path.name}")

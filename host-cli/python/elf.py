@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Union
 
 _MACHINES = {62: "x86_64", 183: "aarch64", 243: "riscv64"}
 _DYNAMIC, _VERSION_NEEDS = 6, 0x6FFFFFFE
@@ -24,13 +25,13 @@ class Needs:
     others: list[str]
 
 
-def needs_of(path: Path) -> Needs:
+def needs_of(path: Union[str, Path]) -> Needs:
     """Reads the needs of a program.
 
     Raises:
         ValueError: if the file is no 64-bit ELF program of a known machine that is linked with glibc.
     """
-    content = path.read_bytes()
+    content = Path(path).read_bytes()
     if content[:6] != b"\x7fELF\x02\x01":
         raise ValueError(f"{path} is no 64-bit little-endian ELF program")
     (machine,) = struct.unpack_from("<H", content, 18)

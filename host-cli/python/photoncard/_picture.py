@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
@@ -17,7 +19,6 @@ from ._exr import Array, Exr, read_exr
 from ._process import Note, run
 
 PathLike = Union[str, "os.PathLike[str]"]
-Folder = tempfile.TemporaryDirectory
 
 #: Prefixes of the channels of mattes, by the names of their layers.
 _MATTES = {"object": "CryptoObject", "material": "CryptoMaterial"}
@@ -25,9 +26,12 @@ _MATTES = {"object": "CryptoObject", "material": "CryptoMaterial"}
 _ORDER = {name: index for index, name in enumerate("RGBXYZA")}
 
 
-def folder() -> Folder[str]:
+class Folder:
     """A folder that is removed when nothing refers to it."""
-    return tempfile.TemporaryDirectory(prefix="photoncard-")
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="photoncard-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
 class Picture:
@@ -40,7 +44,7 @@ class Picture:
         stats: Optional[Mapping[str, Any]] = None,
         notes: Sequence[Note] = (),
         messages: Sequence[str] = (),
-        kept: Optional[Folder[str]] = None,
+        kept: Optional[Folder] = None,
     ) -> None:
         #: Path of the EXR.
         self.path = Path(path)
@@ -142,8 +146,8 @@ class Picture:
     def mix(self, *, exposure: Any = None, tonemap: Optional[str] = None, denoise: bool = False,
             **factors: Any) -> Picture:
         """The picture with the light of its groups times factors, each a number or three: `mix(lamp=0.5)`."""
-        kept = folder()
-        path, png = Path(kept.name, "mix.exr"), Path(kept.name, "mix.png")
+        kept = Folder()
+        path, png = kept.path / "mix.exr", kept.path / "mix.png"
         options = {"group": factors, "exposure": exposure, "tonemap": tonemap, "denoise": denoise}
         words = words_of(["mix"], options)
         outcome = run(["mix"], [*words, f"--output={path}", f"--output={png}", "--", str(self.path)])
@@ -151,9 +155,12 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         if self._png is None:
-            with folder() as place:
-                self._png = self.to_png(Path(place, "picture.png")).read_bytes()
+            self._png = self._rendered_png()
         return self._png
+
+    def _rendered_png(self) -> bytes:
+        place = Folder()
+        return self.to_png(place.path / "picture.png").read_bytes()
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self._layers)

@@ -11,7 +11,7 @@ from typing import Any, Optional
 
 from ._command import words_of
 from ._errors import Error, UnknownOption
-from ._picture import Picture, folder
+from ._picture import Folder, Picture
 from ._process import ProgressOption, run
 from ._progress import shown
 
@@ -29,11 +29,11 @@ def render(path: Path, options: Mapping[str, Any], progress: ProgressOption) -> 
     for name, remedy in _ELSEWHERE.items():
         if options.get(name) is not None:
             raise UnknownOption(f"{name!r} is no option here", remedy)
-    kept = folder()
-    outputs = _outputs(options, Path(kept.name))
+    kept = Folder()
+    outputs = _outputs(options, kept.path)
     stated = {name: value for name, value in options.items() if name not in ("output", "progress", "quiet")}
     frames = stated.get("frames") is not None
-    stats = Path(kept.name, "stats.######.json" if frames else "stats.json")
+    stats = kept.path / ("stats.######.json" if frames else "stats.json")
     files = {"output": [str(path) for path in outputs], "stats": str(stats)}
     words = words_of(["render"], {**stated, **files})
     with shown(False if options.get("quiet") else progress) as show:
@@ -49,8 +49,8 @@ def render(path: Path, options: Mapping[str, Any], progress: ProgressOption) -> 
 
 def merge(*parts: Any, progress: ProgressOption = None, **options: Any) -> Picture:
     """The picture of parts that `photoncard render --part` has written. Options are those of `photoncard merge`."""
-    kept = folder()
-    outputs = _outputs(options, Path(kept.name))
+    kept = Folder()
+    outputs = _outputs(options, kept.path)
     words = words_of(["merge"], {**options, "output": [str(path) for path in outputs]})
     with shown(progress) as show:
         outcome = run(["merge"], [*words, "--", *(os.fspath(part) for part in parts)], show)

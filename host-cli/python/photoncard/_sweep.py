@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 from ._command import value_text, words_of
 from ._errors import Error
-from ._picture import PathLike, folder
+from ._picture import Folder, PathLike
 from ._process import ProgressOption, run
 from ._progress import shown
 from ._scene import Scene
@@ -77,8 +77,8 @@ def sweep(
         raise Error("the sweep varies nothing", 'state a list of values, such as order=["naive", "sort"]')
     vary = [_variation(name.replace("_", "-"), values) for name, values in varied.items()]
     vary += [_variation(f"chip.{name}", values) for name, values in chip.items()]
-    kept = folder() if out is None else None
-    path = Path(kept.name if kept is not None else str(out))
+    kept = Folder() if out is None else None
+    path = kept.path if kept is not None else Path(out)  # type: ignore[arg-type]
     words = words_of(_COMMAND, {**scene.stated(fixed), "vary": vary, "out": path})
     with shown(False if options.get("quiet") else progress) as show:
         run(_COMMAND, [*words, "--", str(scene.path)], show)

@@ -28,7 +28,7 @@ class Wheels(unittest.TestCase):
     def test_wheels_are_equal_and_their_record_holds(self):
         with tempfile.TemporaryDirectory() as folder, environment(SOURCE_DATE_EPOCH="1000000000"):
             wheels = [build.build(pc.command(), Path(folder, name)) for name in ("a", "b")]
-            self.assertEqual(*[wheel.read_bytes() for wheel in wheels])
+            self.assertTrue(wheels[0].read_bytes() == wheels[1].read_bytes(), "the wheels differ")
             with zipfile.ZipFile(wheels[0]) as wheel:
                 names = wheel.namelist()
                 record = next(name for name in names if name.endswith("/RECORD"))
