@@ -39,6 +39,12 @@ def command() -> Path:
     return Path(found)
 
 
+def plain_environment() -> dict[str, str]:
+    """The environment of the command, whose text is without colours. Kernels of Jupyter ask for them."""
+    forcing = ("CLICOLOR_FORCE", "FORCE_COLOR", "CLICOLOR")
+    return {name: value for name, value in os.environ.items() if name not in forcing} | {"NO_COLOR": "1"}
+
+
 def _packaged() -> Optional[str]:
     try:
         files = importlib.metadata.files("photoncard") or []
@@ -123,7 +129,7 @@ def options_of(program: Path, *names: str) -> Mapping[str, Option]:
     """The options of a command, by their keywords."""
     printed = subprocess.run(
         [str(program), *names, "--help"], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8",
-        errors="replace",
+        errors="replace", env=plain_environment(),
     )
     if printed.returncode != 0:
         remedy = "install a photoncard of this package's version"

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Callable, NamedTuple, Optional, Union
 
-from ._command import command, options_of
+from ._command import command, options_of, plain_environment
 from ._errors import Error, of_text
 
 #: Seconds that a terminal's or a notebook's own interrupt has to reach the command. A second one would end
@@ -78,7 +78,9 @@ def run(
     with tempfile.TemporaryFile("w+b") as given, tempfile.TemporaryFile("w+b") as printed:
         given.write((stdin or "").encode())
         given.seek(0)
-        child = subprocess.Popen(arguments, stdin=given, stdout=printed, stderr=subprocess.PIPE)
+        child = subprocess.Popen(
+            arguments, stdin=given, stdout=printed, stderr=subprocess.PIPE, env=plain_environment()
+        )
         listener = _Listener(progress)
         try:
             assert child.stderr is not None

@@ -69,6 +69,13 @@ class Options(unittest.TestCase):
         for name in ("light_groups", "camera_at", "energy_compensation", "display_server", "ic_error", "output"):
             self.assertIn(name, known)
 
+    def test_colours_of_the_command_are_off(self):
+        options_of.cache_clear()
+        with environment(CLICOLOR_FORCE="1", FORCE_COLOR="1"):
+            self.assertIn("order", options_of(pc.command(), "study", "sweep"))
+            with self.assertRaisesRegex(pc.Error, "^cannot read absent.glb"):
+                pc.load("absent.glb")
+
     def test_values_become_words(self):
         options = {"size": (64, 48), "aov": ["direct", "N"], "card": ["emulated:1", "tcp:a:1"], "transparent": True,
                    "irradiance": False, "irradiance_cache": True, "camera_at": (0, 1.5, -2), "seed": None,
