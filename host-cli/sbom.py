@@ -55,7 +55,13 @@ def main() -> None:
 
 
 def _metadata(target: str) -> Any:
-    words = ["metadata", "--locked", "--format-version=1", "--features=photoncard/study", f"--filter-platform={target}"]
+    words = [
+        "metadata",
+        "--locked",
+        "--format-version=1",
+        "--features=photoncard/study",
+        f"--filter-platform={target}",
+    ]
     said = subprocess.run([os.environ.get("CARGO", "cargo"), *words], cwd=ROOT, stdout=subprocess.PIPE)
     if said.returncode != 0:
         sys.exit(f"{sys.argv[0]}: cargo states no metadata")
@@ -65,14 +71,19 @@ def _metadata(target: str) -> Any:
 def _linked(metadata: Any) -> dict[str, list[str]]:
     """The packages that the program contains, with those that each needs."""
     nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
-    waiting = [package["id"] for package in metadata["packages"]
-               if package["name"] == PROGRAM and package["id"] in metadata["workspace_members"]]
+    waiting = [
+        package["id"]
+        for package in metadata["packages"]
+        if package["name"] == PROGRAM and package["id"] in metadata["workspace_members"]
+    ]
     linked: dict[str, list[str]] = {}
     while waiting:
         key = waiting.pop()
         if key not in linked:
             needed = nodes[key]["deps"]
-            linked[key] = [of["pkg"] for of in needed if any(kind["kind"] is None for kind in of["dep_kinds"])]
+            linked[key] = [
+                of["pkg"] for of in needed if any(kind["kind"] is None for kind in of["dep_kinds"])
+            ]
             waiting += linked[key]
     return linked
 

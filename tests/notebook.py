@@ -31,7 +31,9 @@ def main() -> None:
 
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     start = time.monotonic()
-    client = nbclient.NotebookClient(notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": str(ROOT)}})
+    client = nbclient.NotebookClient(
+        notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": str(ROOT)}}
+    )
     try:
         client.execute()
     except nbclient.exceptions.CellExecutionError as reason:

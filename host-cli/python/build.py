@@ -100,7 +100,9 @@ def _version() -> str:
 def _date() -> tuple[int, int, int, int, int, int]:
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if epoch is None:
-        said = subprocess.run(["git", "-C", str(ROOT), "log", "-1", "--format=%ct"], capture_output=True, text=True)
+        said = subprocess.run(
+            ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"], capture_output=True, text=True
+        )
         if said.returncode != 0:
             raise ValueError("outside of git SOURCE_DATE_EPOCH states the time of the files")
         epoch = said.stdout

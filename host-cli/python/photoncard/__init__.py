@@ -1,4 +1,4 @@
-"""Global illumination by photon mapping: renders, measures and bakes glTF scenes by the command ``photoncard``.
+"""Global illumination by photon mapping: renders, measures and bakes glTF scenes by its command.
 
 >>> import photoncard as pc
 >>> scene = pc.load("scenes/room.glb")
@@ -29,6 +29,25 @@ except PackageNotFoundError:
     __version__ = "unknown"
 
 __all__ = [
-    "Error", "Exr", "Item", "Measurement", "Note", "Picture", "Progress", "Scene", "Sweep", "Table", "UnknownName",
-    "UnknownOption", "UnknownProperty", "bake", "command", "load", "measure", "merge", "read", "read_exr", "sweep",
+    "Error",
+    "Exr",
+    "Item",
+    "Measurement",
+    "Note",
+    "Picture",
+    "Progress",
+    "Scene",
+    "Sweep",
+    "Table",
+    "UnknownName",
+    "UnknownOption",
+    "UnknownProperty",
+    "bake",
+    "command",
+    "load",
+    "measure",
+    "merge",
+    "read",
+    "read_exr",
+    "sweep",
 ]

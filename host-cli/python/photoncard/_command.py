@@ -77,7 +77,9 @@ class Option:
             return []
         if not self.takes_value:
             if not isinstance(value, bool):
-                raise Error(f"{self.keyword} is a switch, and {value!r} is no state of it", "state True or False")
+                raise Error(
+                    f"{self.keyword} is a switch, and {value!r} is no state of it", "state True or False"
+                )
             return [f"--{self.name}"] if value else []
         values = self._values(value)
         return [f"--{self.name}={text}" for text in values]
@@ -128,8 +130,12 @@ def value_text(value: Any) -> str:
 def options_of(program: Path, *names: str) -> Mapping[str, Option]:
     """The options of a command, by their keywords."""
     printed = subprocess.run(
-        [str(program), *names, "--help"], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8",
-        errors="replace", env=plain_environment(),
+        [str(program), *names, "--help"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        env=plain_environment(),
     )
     if printed.returncode != 0:
         remedy = "install a photoncard of this package's version"

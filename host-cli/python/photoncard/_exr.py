@@ -75,7 +75,9 @@ class _Reader:
             self._refuse(f"it has the compression {name}, and ZIP or none is read")
         channels = self._pixels(types, window, compression)
         texts = {
-            name: value.decode("utf-8", "replace") for name, (kind, value) in attributes.items() if kind == "string"
+            name: value.decode("utf-8", "replace")
+            for name, (kind, value) in attributes.items()
+            if kind == "string"
         }
         return Exr(channels, window, display, texts)
 

@@ -97,15 +97,20 @@ class Picture:
         Names that no pixel shows are left out.
         """
         prefix = _MATTES.get(layer)
-        ranks = sorted(name[:-2] for name in self._exr.channels if prefix and name.startswith(prefix)
-                       and name.endswith(".r"))
+        ranks = sorted(
+            name[:-2]
+            for name in self._exr.channels
+            if prefix and name.startswith(prefix) and name.endswith(".r")
+        )
         if not ranks:
             raise UnknownName(f"the picture has no mattes {layer!r}", f"render it with aov=[{layer!r}]")
         pairs = [(f"{rank}.{key}", f"{rank}.{share}") for rank in ranks for key, share in ("rg", "ba")]
         mattes = {}
         for name, key in self._manifest(prefix or "").items():
-            shares = [np.where(_bits(self._exr.channels[of]) == int(key, 16), self._exr.channels[share], 0)
-                      for of, share in pairs]
+            shares = [
+                np.where(_bits(self._exr.channels[of]) == int(key, 16), self._exr.channels[share], 0)
+                for of, share in pairs
+            ]
             coverage = np.sum(shares, axis=0, dtype=np.float32)
             if coverage.any():
                 mattes[name] = coverage
@@ -143,8 +148,9 @@ class Picture:
         _write(path, self.path.read_bytes())
         return path
 
-    def mix(self, *, exposure: Any = None, tonemap: Optional[str] = None, denoise: bool = False,
-            **factors: Any) -> Picture:
+    def mix(
+        self, *, exposure: Any = None, tonemap: Optional[str] = None, denoise: bool = False, **factors: Any
+    ) -> Picture:
         """The picture with the light of its groups times factors, each a number or three: `mix(lamp=0.5)`."""
         kept = Folder()
         path, png = kept.path / "mix.exr", kept.path / "mix.png"

@@ -156,7 +156,9 @@ class _Listener:
             return Error(self._failure.get("message", ""), self._failure.get("remedy"), status)
         if status < 0:
             name = signal.Signals(-status).name
-            return Error(f"the command was ended by {name}", "if memory was short, take a smaller picture", status)
+            return Error(
+                f"the command was ended by {name}", "if memory was short, take a smaller picture", status
+            )
         return of_text("\n".join(self.outcome.messages), status)
 
 

@@ -41,8 +41,14 @@ def render(path: Path, options: Mapping[str, Any], progress: ProgressOption) -> 
     numbers = _numbers(stats) if frames else [None]
     exr, png = _pair(outputs)
     return [
-        Picture(_numbered(exr, number), _numbered(png, number), _json(_numbered(stats, number)),
-                outcome.notes, outcome.messages, kept)
+        Picture(
+            _numbered(exr, number),
+            _numbered(png, number),
+            _json(_numbered(stats, number)),
+            outcome.notes,
+            outcome.messages,
+            kept,
+        )
         for number in numbers
     ]
 
@@ -65,7 +71,9 @@ def _outputs(options: Mapping[str, Any], place: Path) -> list[Path]:
         for name in _BESIDE:
             if options.get(name):
                 raise Error(f"{name} needs a picture that stays", "state output='picture.exr'")
-    outputs = [Path(stated)] if isinstance(stated, (str, os.PathLike)) else [Path(path) for path in stated or []]
+    outputs = (
+        [Path(stated)] if isinstance(stated, (str, os.PathLike)) else [Path(path) for path in stated or []]
+    )
     name = "picture.######" if options.get("frames") is not None else "picture"
     suffixes = {path.suffix for path in outputs}
     return outputs + [place / f"{name}{suffix}" for suffix in (".exr", ".png") if suffix not in suffixes]

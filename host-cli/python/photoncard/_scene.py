@@ -16,8 +16,16 @@ from ._render import render
 
 #: Properties by where they are, with the number of values that each may have.
 _MATERIAL = {
-    "diffuse": (1, 3), "specular": (1, 3), "emission": (1, 3), "exponent": (1,), "metallic": (1,), "roughness": (1,),
-    "transmission": (1,), "ior": (1,), "thickness": (1,), "alpha": (1,),
+    "diffuse": (1, 3),
+    "specular": (1, 3),
+    "emission": (1, 3),
+    "exponent": (1,),
+    "metallic": (1,),
+    "roughness": (1,),
+    "transmission": (1,),
+    "ior": (1,),
+    "thickness": (1,),
+    "alpha": (1,),
 }
 _LIGHT = {"colour": (1, 3), "intensity": (1,), "position": (3,), "angle": (1,), "ies": ()}
 _ENVIRONMENT = {"strength": (1,)}
@@ -36,14 +44,20 @@ def load(path: PathLike, *, prepared: bool = False, **options: Any) -> Scene:
     >>> [camera["name"] for camera in scene.cameras]
     ['camera']
     """
-    known = {name: option for name, option in options_of(command(), "render").items() if option.heading == "Scene"}
+    known = {
+        name: option for name, option in options_of(command(), "render").items() if option.heading == "Scene"
+    }
     for name in options:
         if name not in known or name in ("set", "prepared"):
             allowed = [other for other in known if other not in ("set", "prepared")]
-            raise UnknownOption(f"{name!r} is no option of a scene", f"there are {known_names(name, allowed)}")
+            raise UnknownOption(
+                f"{name!r} is no option of a scene", f"there are {known_names(name, allowed)}"
+            )
     if prepared:
         if not Path(path).is_file():
-            raise Error(f"cannot read {os.fspath(path)}", "check that the path names a file and that it may be read")
+            raise Error(
+                f"cannot read {os.fspath(path)}", "check that the path names a file and that it may be read"
+            )
         return Scene(path, None, options)
     units = {name: value for name, value in options.items() if name == "light_units"}
     words = [*words_of(["scene", "info"], units), "--json", "--", os.fspath(path)]
@@ -70,7 +84,9 @@ class Scene:
     def info(self) -> Mapping[str, Any]:
         """All that `photoncard scene info --json` states of the file."""
         if self._info is None:
-            raise Error(f"the contents of {self.path} are not known", "load the glTF file that it was prepared from")
+            raise Error(
+                f"the contents of {self.path} are not known", "load the glTF file that it was prepared from"
+            )
         return self._info
 
     @property
@@ -105,7 +121,9 @@ class Scene:
         <scene room.glb: 0 lights, 11 materials, 1 camera, lamp.emission=28,24,19>
         """
         if name not in self.names:
-            raise UnknownName(f"{self.path.name} has no {name!r}", f"there are {known_names(name, self.names, 99)}")
+            raise UnknownName(
+                f"{self.path.name} has no {name!r}", f"there are {known_names(name, self.names, 99)}"
+            )
         return Item(self, name)
 
     def _ipython_key_completions_(self) -> list[str]:
@@ -122,7 +140,11 @@ class Scene:
         """Options of a command on this scene: the scene's, its assignments, and `options`."""
         stated = {**self.options, **options}
         more = stated.pop("set", None)
-        added = [f"{name}={value_text(value)}" for name, value in more.items()] if isinstance(more, Mapping) else more
+        added = (
+            [f"{name}={value_text(value)}" for name, value in more.items()]
+            if isinstance(more, Mapping)
+            else more
+        )
         added = [added] if isinstance(added, str) else list(added or [])
         if self._set() or added:
             stated["set"] = [*self._set(), *added]
@@ -161,8 +183,9 @@ class Scene:
         [picture] = render(self.path, self.stated({**own, **options}), progress)
         return picture
 
-    def animate(self, frames: Union[str, Sequence[int]], *, progress: ProgressOption = None,
-                **options: Any) -> list[Picture]:
+    def animate(
+        self, frames: Union[str, Sequence[int]], *, progress: ProgressOption = None, **options: Any
+    ) -> list[Picture]:
         """Renders frames of the scene's animations, such as `"1-24"` or `[1, 12]`. Options are those of
         :meth:`render`.
         """
@@ -171,8 +194,10 @@ class Scene:
     def __repr__(self) -> str:
         if self._info is None:
             return f"<prepared scene {self.path.name}>"
-        counts = [f"{len(self._info[kind])} {kind[:-1] if len(self._info[kind]) == 1 else kind}"
-                  for kind in ("lights", "materials", "cameras")]
+        counts = [
+            f"{len(self._info[kind])} {kind[:-1] if len(self._info[kind]) == 1 else kind}"
+            for kind in ("lights", "materials", "cameras")
+        ]
         return f"<scene {self.path.name}: {', '.join([*counts, *self._set()])}>"
 
 
@@ -198,7 +223,9 @@ class Item:
     def _counts(self, of: str) -> tuple[int, ...]:
         known = self._properties()
         if of not in known:
-            raise UnknownProperty(f"{self._name!r} has no {of!r} to set", f"there are {known_names(of, known)}")
+            raise UnknownProperty(
+                f"{self._name!r} has no {of!r} to set", f"there are {known_names(of, known)}"
+            )
         return known[of]
 
     def __setattr__(self, of: str, value: Value) -> None:

@@ -91,7 +91,11 @@ def _variation(name: str, values: Sequence[Any]) -> str:
     >>> _variation("order", ["naive", "sort"]), _variation("size", [(64, 64), (32, 32)])
     ('order=naive,sort', 'size=64x64;32x32')
     """
-    texts = ["x".join(map(str, value)) if name == "size" and not isinstance(value, (str, int)) else value_text(value)
-             for value in values]
+    texts = [
+        "x".join(map(str, value))
+        if name == "size" and not isinstance(value, (str, int))
+        else value_text(value)
+        for value in values
+    ]
     separator = ";" if len(texts) > 1 and (name == "size" or any("," in text for text in texts)) else ","
     return f"{name}={separator.join(texts)}"

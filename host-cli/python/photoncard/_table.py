@@ -57,7 +57,9 @@ class Table:
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.columns:
-            raise UnknownName(f"there is no column {name!r}", f"columns are {known_names(name, self.columns, 99)}")
+            raise UnknownName(
+                f"there is no column {name!r}", f"columns are {known_names(name, self.columns, 99)}"
+            )
         return self.array[name]
 
     def __len__(self) -> int:
@@ -82,7 +84,9 @@ class Table:
         try:
             import pandas
         except ImportError as reason:
-            raise Error("pandas is missing", "run: pip install pandas; or take the array of the table") from reason
+            raise Error(
+                "pandas is missing", "run: pip install pandas; or take the array of the table"
+            ) from reason
         return pandas.DataFrame({name: self.array[name] for name in self.columns})
 
 

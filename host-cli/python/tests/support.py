@@ -1,4 +1,4 @@
-"""What the tests share. They run against the installed package: `python -m unittest discover -s host-cli/python/tests`."""
+"""What the tests share. They run against the installed package."""
 
 import contextlib
 import os

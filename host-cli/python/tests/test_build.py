@@ -50,7 +50,10 @@ class Wheels(unittest.TestCase):
     def test_other_files_have_no_tag(self):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "a")
-            for content in (b"#!/bin/sh\n", b"\x7fELF\x02\x01" + bytes(12) + struct.pack("<H", 8) + bytes(90)):
+            for content in (
+                b"#!/bin/sh\n",
+                b"\x7fELF\x02\x01" + bytes(12) + struct.pack("<H", 8) + bytes(90),
+            ):
                 path.write_bytes(content)
                 with self.assertRaises(ValueError):
                     build.tag_of(path)
@@ -61,8 +64,13 @@ class Examples(unittest.TestCase):
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(ROOT)
         attempted = 0
-        for module in [pc, *(importlib.import_module(f"photoncard.{found.name}")
-                             for found in pkgutil.iter_modules(pc.__path__))]:
+        for module in [
+            pc,
+            *(
+                importlib.import_module(f"photoncard.{found.name}")
+                for found in pkgutil.iter_modules(pc.__path__)
+            ),
+        ]:
             results = doctest.testmod(module)
             self.assertEqual(results.failed, 0, module.__name__)
             attempted += results.attempted

@@ -40,7 +40,8 @@ def exr(channels, compression, together):
     for first in range(0, height, together):
         rows = b"".join(
             channels[name][row].tobytes()
-            for row in range(first, min(first + together, height)) for name in sorted(channels)
+            for row in range(first, min(first + together, height))
+            for name in sorted(channels)
         )
         data = packed(rows) if compression else rows
         blocks.append(struct.pack("<ii", 7 + first, len(data)) + data)
@@ -53,8 +54,12 @@ def exr(channels, compression, together):
 
 def pixels():
     smooth = np.linspace(0, 8, WIDTH * HEIGHT).reshape(HEIGHT, WIDTH)
-    return {"R": smooth.astype("<f4"), "G": (smooth / 3).astype("<f2"), "B": np.sqrt(smooth).astype("<f4"),
-            "id": np.arange(WIDTH * HEIGHT, dtype="<u4").reshape(HEIGHT, WIDTH)}
+    return {
+        "R": smooth.astype("<f4"),
+        "G": (smooth / 3).astype("<f2"),
+        "B": np.sqrt(smooth).astype("<f4"),
+        "id": np.arange(WIDTH * HEIGHT, dtype="<u4").reshape(HEIGHT, WIDTH),
+    }
 
 
 class Exr(unittest.TestCase):

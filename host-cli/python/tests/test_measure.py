@@ -39,8 +39,12 @@ class Measures(unittest.TestCase):
         self.assertGreater(probes["l0_m0_g"][0], 0)
 
     def test_bad_points_are_refused(self):
-        for points, message in (([[1, 2]], "shape"), ([["a", "b", "c"]], "no rows of numbers"),
-                                ([[0, np.nan, 0]], "the point 0"), (None, "points or a grid")):
+        for points, message in (
+            ([[1, 2]], "shape"),
+            ([["a", "b", "c"]], "no rows of numbers"),
+            ([[0, np.nan, 0]], "the point 0"),
+            (None, "points or a grid"),
+        ):
             with self.assertRaisesRegex(pc.Error, message):
                 pc.measure(self.room, points)
         with self.assertRaisesRegex(pc.Error, "no node walls"):
@@ -49,7 +53,10 @@ class Measures(unittest.TestCase):
             self.table["illuminance"]
 
     def test_pandas_is_optional(self):
-        with mock.patch.dict("sys.modules", pandas=None), self.assertRaisesRegex(pc.Error, "pip install pandas"):
+        with (
+            mock.patch.dict("sys.modules", pandas=None),
+            self.assertRaisesRegex(pc.Error, "pip install pandas"),
+        ):
             self.table.to_pandas()
         try:
             import pandas
@@ -60,15 +67,23 @@ class Measures(unittest.TestCase):
 
     def test_a_bake_is_a_scene(self):
         with tempfile.TemporaryDirectory() as folder:
-            path = pc.bake(pc.load(SCENES / "cornell.gltf"), Path(folder, "baked.glb"), texels_per_metre=2,
-                           photons=2000, spp=1, gather_rays=4)
+            path = pc.bake(
+                pc.load(SCENES / "cornell.gltf"),
+                Path(folder, "baked.glb"),
+                texels_per_metre=2,
+                photons=2000,
+                spp=1,
+                gather_rays=4,
+            )
             self.assertGreater(pc.load(path).info["triangles"], 10)
 
 
 class Sweeps(unittest.TestCase):
     def test_every_combination_is_a_row(self):
         scene = pc.load(SCENES / "cornell.gltf")
-        sweep = pc.sweep(scene, order=["naive", "sort"], seed=[1, 2], size=(32, 32), photons=2000, gather_rays=20)
+        sweep = pc.sweep(
+            scene, order=["naive", "sort"], seed=[1, 2], size=(32, 32), photons=2000, gather_rays=20
+        )
         rows = list(zip(sweep.points["order"], sweep.points["seed"]))
         self.assertEqual(rows, [("naive", 1), ("naive", 2), ("sort", 1), ("sort", 2)])
         read = sweep.points["photon map and scene (GB)"]

@@ -41,11 +41,17 @@ class Renders(unittest.TestCase):
         cls.scene = pc.load(SCENES / "cornell.gltf")
         cls.seen = []
         cls.picture = cls.scene.render(
-            (24, 16), aov=["direct", "indirect", "caustic", "Z", "N", "object"], progress=cls.seen.append, **QUICK)
+            (24, 16),
+            aov=["direct", "indirect", "caustic", "Z", "N", "object"],
+            progress=cls.seen.append,
+            **QUICK,
+        )
 
     def test_the_image_is_the_sum_of_its_parts(self):
         picture = self.picture
-        self.assertEqual((picture.image.shape, picture.image.dtype, picture.size), ((16, 24, 3), np.float32, (24, 16)))
+        self.assertEqual(
+            (picture.image.shape, picture.image.dtype, picture.size), ((16, 24, 3), np.float32, (24, 16))
+        )
         self.assertGreater(picture.image.mean(), 0.01)
         total = picture["direct"] + picture["indirect"] + picture["caustic"]
         np.testing.assert_allclose(total, picture.image, atol=1e-5)
@@ -127,8 +133,9 @@ class Renders(unittest.TestCase):
 class Interrupts(unittest.TestCase):
     def interrupted(self, whole_group):
         with program(WAITING) as path:
-            child = subprocess.Popen([sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True,
-                                     start_new_session=True)
+            child = subprocess.Popen(
+                [sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True, start_new_session=True
+            )
             self.assertEqual(child.stdout.readline(), "1\n")
             start = time.monotonic()
             os.killpg(child.pid, signal.SIGINT) if whole_group else child.send_signal(signal.SIGINT)

@@ -29,7 +29,9 @@ class Scenes(unittest.TestCase):
         self.assertEqual(self.room["lamp"].emission, (1, 2, 3))
         self.assertEqual(self.room.stated({})["set"], ["lamp.emission=1,2,3", "lamp.alpha=0.5"])
         del self.room["lamp"].alpha
-        self.assertEqual(self.room.stated({"set": {"floor.alpha": 1}})["set"], ["lamp.emission=1,2,3", "floor.alpha=1"])
+        self.assertEqual(
+            self.room.stated({"set": {"floor.alpha": 1}})["set"], ["lamp.emission=1,2,3", "floor.alpha=1"]
+        )
         self.room.reset()
         self.assertNotIn("set", self.room.stated({}))
 
@@ -66,7 +68,14 @@ class Options(unittest.TestCase):
     def test_every_option_of_the_help_is_a_keyword(self):
         known = options_of(pc.command(), "render")
         self.assertGreater(len(known), 60)
-        for name in ("light_groups", "camera_at", "energy_compensation", "display_server", "ic_error", "output"):
+        for name in (
+            "light_groups",
+            "camera_at",
+            "energy_compensation",
+            "display_server",
+            "ic_error",
+            "output",
+        ):
             self.assertIn(name, known)
 
     def test_colours_of_the_command_are_off(self):
@@ -77,12 +86,32 @@ class Options(unittest.TestCase):
                 pc.load("absent.glb")
 
     def test_values_become_words(self):
-        options = {"size": (64, 48), "aov": ["direct", "N"], "card": ["emulated:1", "tcp:a:1"], "transparent": True,
-                   "irradiance": False, "irradiance_cache": True, "camera_at": (0, 1.5, -2), "seed": None,
-                   "light_groups": {"key": ["lamp", "sun"]}, "environment": Path("sky.exr")}
-        self.assertEqual(words_of(["render"], options), [
-            "--size=64x48", "--aov=direct,N", "--card=emulated:1", "--card=tcp:a:1", "--transparent",
-            "--irradiance-cache=on", "--camera-at=0,1.5,-2", "--light-groups=key=lamp,sun", "--environment=sky.exr"])
+        options = {
+            "size": (64, 48),
+            "aov": ["direct", "N"],
+            "card": ["emulated:1", "tcp:a:1"],
+            "transparent": True,
+            "irradiance": False,
+            "irradiance_cache": True,
+            "camera_at": (0, 1.5, -2),
+            "seed": None,
+            "light_groups": {"key": ["lamp", "sun"]},
+            "environment": Path("sky.exr"),
+        }
+        self.assertEqual(
+            words_of(["render"], options),
+            [
+                "--size=64x48",
+                "--aov=direct,N",
+                "--card=emulated:1",
+                "--card=tcp:a:1",
+                "--transparent",
+                "--irradiance-cache=on",
+                "--camera-at=0,1.5,-2",
+                "--light-groups=key=lamp,sun",
+                "--environment=sky.exr",
+            ],
+        )
 
     def test_wrong_keywords_are_refused(self):
         with self.assertRaisesRegex(pc.UnknownOption, "'gatherrays'.*'gather_rays'"):
@@ -101,7 +130,10 @@ class Commands(unittest.TestCase):
 
     def test_a_command_without_studies_is_named(self):
         scene = pc.load(SCENES / "cornell.gltf")
-        with program("exit 2"), self.assertRaisesRegex(pc.Error, "no command 'study sweep'.*--features study"):
+        with (
+            program("exit 2"),
+            self.assertRaisesRegex(pc.Error, "no command 'study sweep'.*--features study"),
+        ):
             pc.sweep(scene, order=["naive", "sort"])
 
 
