@@ -58,7 +58,7 @@ cargo=${CARGO:-cargo}
 [[ $(tar --version 2>/dev/null) == *GNU* ]] || fail "GNU tar is missing; it sorts the names in an archive"
 command -v strip >/dev/null || fail "strip is missing; on Debian: sudo apt-get install binutils"
 ! wants deb || command -v dpkg-deb >/dev/null || fail "dpkg-deb is missing; on Debian: sudo apt-get install dpkg; or name other formats"
-if wants deb || wants wheel || wants sbom; then
+if wants deb || wants wheel || wants blender || wants sbom; then
     command -v python3 >/dev/null || fail "python3 is missing; on Debian: sudo apt-get install python3; or name other formats"
 fi
 export PYTHONDONTWRITEBYTECODE=1
@@ -186,11 +186,7 @@ pack_wheel() {
 }
 
 pack_blender() {
-    if [ ! -x host-cli/blender/build.sh ]; then
-        echo "$0: SKIPPED: the extension of Blender: host-cli/blender/build.sh is missing" >&2
-        return
-    fi
-    host-cli/blender/build.sh "$files/bin/photoncard" "$packages" >/dev/null
+    python3 host-cli/blender/build.py "$files/bin/photoncard" "$packages" >/dev/null
 }
 
 pack_container() {

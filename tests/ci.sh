@@ -240,8 +240,28 @@ install_deny() {
     PATH=$PATH:$(realpath "$folder/bin")
 }
 
+# The package of Python, from its wheel, and the notebook, each by the Python of a folder of its own.
+test_python() {
+    local folder=${CARGO_TARGET_DIR:-target}/python wheel=("$1"/photoncard-*.whl)
+    if ! python3 -m venv --clear "$folder" || ! "$folder/bin/pip" install --quiet "${wheel[0]}" nbclient ipykernel matplotlib pandas; then
+        skip "the package of Python and the notebook" "NumPy, nbclient, ipykernel or matplotlib cannot be installed"
+        return
+    fi
+    "$folder/bin/python" -B -m unittest discover --start-directory host-cli/python/tests
+    "$folder/bin/python" -B tests/notebook.py
+}
+
 check_packages() {
-    step "packages"
+    step "packages of a release"
+    local program=${CARGO_TARGET_DIR:-target}/debug/photoncard dist
+    cargo build -p photoncard --features photoncard/study --locked
+    dist=$(mktemp -d)
+    host-cli/package.sh --check --binary "$(realpath "$program")" --out "$dist"
+    step "package of Python"
+    test_python "$dist"
+    rm -r "$dist"
+
+    step "packages of crates"
     tests/publishable.sh || {
         [ $? = 75 ] || fail "the crates cannot be packed"
         go_without "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"

@@ -35,7 +35,10 @@ if [ -z "$base" ]; then
 fi
 
 # in_root COMMAND: runs it in the root, with its own processes and mounts.
-in_root() { unshare --mount --pid --fork chroot "$root" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin sh -euc "$1"; }
+in_root() {
+    unshare --mount --pid --fork chroot "$root" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin \
+        PIP_CERT=/etc/ssl/certs/ca-certificates.crt https_proxy="${https_proxy:-}" sh -euc "$1"
+}
 render="render /cornell.gltf --size 160x120 --quality draft --quiet -o /picture.png"
 # try NAME COMMAND: a root of its own, in which the command installs a package and renders.
 try() {
@@ -43,6 +46,8 @@ try() {
     root=$work/$name
     cp -a "$base" "$root"
     cp -L /etc/resolv.conf "$root/etc/" 2>/dev/null || true
+    # The root reaches the index of packages as this machine does.
+    cp -L "${PIP_CERT:-/etc/ssl/certs/ca-certificates.crt}" "$root/etc/ssl/certs/ca-certificates.crt"
     cp "$dist"/*.tar.gz "$dist"/*.deb "$dist"/*.whl scenes/cornell.gltf "$root/"
     ! in_root "command -v cargo || command -v rustc" >/dev/null || fail "the root has Rust"
     start=$(date +%s.%N)

@@ -81,7 +81,7 @@ fn refusals_name_a_remedy() {
         (&["--size", "8192", "--texels-per-metre", "3000"], &["lower --texels-per-metre"]),
         (&["--size", "0"], &["pages of 0 texels", "--size"]),
         (&["--supersample", "9"], &["9 sensors", "1 to 4"]),
-        (&["--texels-per-metre", "4", "--merge", "box.gltf"], &["box.gltf", "part"]),
+        (&["--texels-per-metre", "4", "--merge", "box.gltf"], &["box.gltf", "before --merge"]),
     ] {
         let words: Vec<&str> = [&["bake", "box.gltf", "--quiet", "-o", "out.glb"], options].concat();
         let outcome = room.run(&words);
