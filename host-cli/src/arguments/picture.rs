@@ -68,6 +68,9 @@ pub(crate) struct PictureOptions {
     /// the picture is towards +x, so that the top is towards +z or -z, respectively.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     look_at: Option<[f64; 3]>,
+    /// Direction that is up in the picture [default: +y with --look-at, else the camera's own]
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, hide_short_help = true)]
+    up: Option<[f64; 3]>,
     /// Vertical field of view, degrees [default: the camera's own]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f32>,
@@ -139,6 +142,7 @@ impl PictureOptions {
             camera,
             camera_at,
             look_at,
+            up,
             fov,
             orthographic,
             panorama,
@@ -159,6 +163,7 @@ impl PictureOptions {
             camera: camera.clone(),
             camera_at: *camera_at,
             look_at: *look_at,
+            up: *up,
             fov: *fov,
             orthographic: *orthographic,
             panorama: *panorama,

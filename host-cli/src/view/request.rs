@@ -56,6 +56,10 @@ pub(super) struct View {
     pub(super) camera: Option<String>,
     pub(super) position: [f64; 3],
     pub(super) look_at: [f64; 3],
+    /// Direction that is up in the picture; `None` for +y.
+    pub(super) up: Option<[f64; 3]>,
+    /// Lens shift; `None` for that of the view so far.
+    pub(super) shift: Option<[f32; 2]>,
     pub(super) shown: Extent,
 }
 
@@ -137,7 +141,7 @@ fn view(fields: &Fields) -> Result<View, String> {
     let shown = if is_stated("height") {
         Extent::Height(fields.number("height", 1e-6, 1e9)? as f32)
     } else if is_stated("angles") {
-        Extent::Angles(fields.angles("angles")?)
+        Extent::Angles(fields.pair("angles")?)
     } else {
         Extent::Fov(fields.number("fov", 1e-3, 179.999)? as f32)
     };
@@ -145,6 +149,8 @@ fn view(fields: &Fields) -> Result<View, String> {
         camera: if is_stated("name") { Some(fields.text("name")?) } else { None },
         position: fields.place("position")?,
         look_at: fields.place("look_at")?,
+        up: if is_stated("up") { Some(fields.place("up")?) } else { None },
+        shift: if is_stated("shift") { Some(fields.pair("shift")?) } else { None },
         shown,
     })
 }
@@ -243,12 +249,12 @@ impl Fields<'_> {
         place.ok_or_else(|| format!("{name:?} is a place: a list of three numbers of metres"))
     }
 
-    fn angles(&self, name: &str) -> Result<[f32; 2], String> {
+    fn pair(&self, name: &str) -> Result<[f32; 2], String> {
         let list = self.field(name)?.as_array().filter(|list| list.len() == 2);
         let number = |value: &Value| value.as_f64().map(|number| number as f32);
         let numbers: Option<Vec<f32>> = list.and_then(|list| list.iter().map(number).collect());
-        let angles = numbers.and_then(|numbers| numbers.try_into().ok());
-        angles.ok_or_else(|| format!("{name:?} is a list of two angles in degrees"))
+        let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+        numbers.ok_or_else(|| format!("{name:?} is a list of two numbers"))
     }
 
     fn pixel(&self, name: &str) -> Result<[u32; 2], String> {
@@ -280,7 +286,7 @@ mod tests {
 
     /// View of the tests' messages.
     fn view(camera: Option<String>, shown: Extent) -> View {
-        View { camera, position: [1.0, 2.5, -3.0], look_at: [0.0; 3], shown }
+        View { camera, position: [1.0, 2.5, -3.0], look_at: [0.0; 3], up: None, shift: None, shown }
     }
 
     #[test]
@@ -297,6 +303,17 @@ mod tests {
             (
                 r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"angles":[360,180],"moving":false}"#,
                 Request::Camera { view: view(None, Extent::Angles([360.0, 180.0])), is_moving: false },
+            ),
+            (
+                r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"up":[0,0,-1],"shift":[0.1,-2],"fov":40,"moving":false}"#,
+                Request::Camera {
+                    view: View {
+                        up: Some([0.0, 0.0, -1.0]),
+                        shift: Some([0.1, -2.0]),
+                        ..view(None, Extent::Fov(40.0))
+                    },
+                    is_moving: false,
+                },
             ),
             (
                 r#"{"type":"set","name":"a.b","value":2}"#,
@@ -365,6 +382,8 @@ mod tests {
             (camera("[0,0,1]", "0"), "fov"),
             (camera("[0,0,1]", "180"), "fov"),
             (camera("[0,0,1]", "null"), "fov"),
+            (camera("[0,0,1],\"up\":[0,1]", "40"), "up"),
+            (camera("[0,0,1],\"shift\":0.5", "40"), "shift"),
             (r#"{"type":"set","name":"a.b","value":1e39}"#.into(), "value"),
             (r#"{"type":"set","name":"a.b","value":[1,2]}"#.into(), "value"),
             (format!(r#"{{"type":"set","name":"{}","value":1}}"#, "a".repeat(2000)), "name"),

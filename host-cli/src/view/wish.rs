@@ -57,13 +57,14 @@ impl Wish {
 
     /// Sets position, target and projection of the camera, and whose lens and shift it has.
     pub(super) fn look(&mut self, view: View) {
-        let View { camera, position, look_at, shown } = view;
+        let View { camera, position, look_at, up, shift, shown } = view;
         let picture = &mut self.settings.picture;
-        (picture.camera_at, picture.look_at) = (Some(position), Some(look_at));
+        (picture.camera_at, picture.look_at, picture.up) = (Some(position), Some(look_at), up);
         if camera.is_some() {
             // A chosen camera has its own lens and shift.
             (picture.camera, picture.aperture, picture.focus, picture.shift) = (camera, None, None, None);
         }
+        picture.shift = shift.or(picture.shift);
         (picture.fov, picture.orthographic, picture.panorama) = match shown {
             Extent::Fov(degrees) => (Some(degrees), None, None),
             Extent::Height(metres) => (None, Some(metres), None),

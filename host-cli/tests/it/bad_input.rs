@@ -150,6 +150,8 @@ fn numbers_out_of_range_are_refused() {
         ("--camera-at", "1,2,nan", ["three numbers of metres", "0,1.5,4"]),
         ("--look-at", "-1,-2,-3,-4", ["three numbers of metres", "0,1.5,4"]),
         ("--look-at", "0,0.5,3", ["the camera itself is there", "--camera-at"]),
+        ("--up", "0,0,0", ["no direction", "0,1,0"]),
+        ("--up", "0,0,-2", ["no direction", "0,1,0"]),
         ("--fov", "0", ["above 0 and below 180", "such as 40"]),
         ("--fov", "-20", ["above 0 and below 180", "such as 40"]),
         ("--fov", "180", ["above 0 and below 180", "such as 40"]),

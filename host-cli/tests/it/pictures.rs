@@ -276,6 +276,13 @@ fn a_view_by_options_equals_that_of_a_camera_there() {
     // Options that are not stated leave the values of the file's camera.
     assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
     assert!(pixels("other.gltf", &place) != expected);
+    // A camera that is turned by a quarter about its axis.
+    stated["nodes"][1]["rotation"] = json!([0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()]);
+    stated["scenes"][0]["nodes"] = json!([0, 1]);
+    room.write_scene("turned.gltf", &stated);
+    let turned = pixels("turned.gltf", &["--up", "-1,0,0"]);
+    assert!(pixels("other.gltf", &[&view[..], &["--up=-2,0,0"]].concat()) == turned);
+    assert!(turned != expected);
 }
 
 /// Options and the camera in the file state equal projections.

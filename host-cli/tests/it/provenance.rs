@@ -15,6 +15,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--camera", "camera"], "camera", json!("camera")),
         (&["--camera-at", "0,1.25, 2"], "camera-at", json!([0.0, 1.25, 2.0])),
         (&["--look-at", "-0.5,0.5,0"], "look-at", json!([-0.5, 0.5, 0.0])),
+        (&["--up", "0.5,1,0", "--look-at", "0,0.5,0"], "up", json!([0.5, 1.0, 0.0])),
         (&["--fov", "12.5"], "fov", json!(12.5)),
         (&["--orthographic", "2.5"], "orthographic", json!(2.5)),
         (&["--panorama", "180"], "panorama", json!([180.0, 180.0])),

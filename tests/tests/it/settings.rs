@@ -77,6 +77,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             camera: Pixels = Some("second".to_owned()),
             camera_at: Pixels = Some([0.1, 0.2, 2.0]),
             look_at: Pixels = Some([0.1, 0.2, -0.3]),
+            up: Pixels = Some([0.1, 1.0, 0.0]),
             fov: Pixels = Some(20.0),
             orthographic: Pixels = Some(1.0),
             panorama: Pixels = Some([90.0, 60.0]),

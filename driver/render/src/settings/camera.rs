@@ -19,7 +19,7 @@ impl RenderSettings {
     /// # Errors
     /// If the scene has no camera with this name, or the values are not valid for a camera.
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
-        let Picture { camera, camera_at, look_at, .. } = &self.picture;
+        let Picture { camera, camera_at, look_at, up, .. } = &self.picture;
         let mut camera = scene.camera(camera.as_deref())?.clone();
         if let Some(at) = camera_at {
             camera.origin = placed("picture.camera_at", *at, scene)?;
@@ -31,6 +31,10 @@ impl RenderSettings {
             let forward = view.try_normalize().ok_or_else(|| at_the_camera(scene.in_file(target)))?;
             [camera.right, camera.up, camera.forward] = upright(forward).map(DVec3::as_vec3);
             distance = Some(view.length() as f32);
+        }
+        if let Some(up) = up {
+            let axes = turned(camera.forward.as_dvec3(), *up)?;
+            [camera.right, camera.up, camera.forward] = axes.map(DVec3::as_vec3);
         }
         self.picture.project(&mut camera)?;
         self.picture.focus(&mut camera, distance)?;
@@ -127,6 +131,22 @@ impl Picture {
 
 fn refused(field: &'static str, value: &impl ToString, reason: String, remedy: &'static str) -> RenderError {
     RenderError::Setting { field, value: value.to_string(), reason, remedy: remedy.into() }
+}
+
+/// Right, up and forward vectors of a camera in whose picture the direction `up` is up.
+///
+/// # Errors
+/// If the directions are parallel, or `up` has no length.
+fn turned(forward: DVec3, up: [f64; 3]) -> Result<[DVec3; 3], RenderError> {
+    let right = DVec3::from(up).try_normalize().map(|up| forward.cross(up));
+    let right = right.filter(|right| right.length() >= VERTICAL).ok_or_else(|| {
+        let value = format!("{},{},{}", up[0], up[1], up[2]);
+        let reason = "it is no direction, or that in which the camera looks".to_owned();
+        refused("picture.up", &value, reason, "give another direction, such as 0,1,0")
+    })?;
+    let right = right.normalize();
+    let up = right.cross(forward);
+    Ok([right, up, forward])
 }
 
 /// Right, up and forward vectors of an upright camera: up is in the plane of the direction `forward` and +y.

@@ -35,9 +35,12 @@ pub struct Picture {
     pub camera: Option<String>,
     /// Position of the camera in the coordinates of the scene's file, metres; `None` for the camera's own.
     pub camera_at: Option<[f64; 3]>,
-    /// Point at which the camera looks, in the coordinates of the scene's file, metres; +y is up in the
-    /// picture. `None` for the camera's own direction.
+    /// Point at which the camera looks, in the coordinates of the scene's file, metres. `None` for the
+    /// camera's own direction.
     pub look_at: Option<[f64; 3]>,
+    /// Direction that is up in the picture, of any length; `None` for +y with [`Self::look_at`], else for the
+    /// camera's own.
+    pub up: Option<[f64; 3]>,
     /// Vertical field of view of a perspective picture, degrees; `None` for the camera's own projection. At
     /// most one of `fov`, `orthographic` and `panorama` can be stated.
     pub fov: Option<f32>,
@@ -108,6 +111,7 @@ impl Picture {
             camera,
             camera_at,
             look_at,
+            up,
             fov,
             orthographic,
             panorama,
@@ -138,6 +142,7 @@ impl Picture {
             setting(Pixels, "picture.camera", "camera", optional(camera.clone())),
             setting(Pixels, "picture.camera_at", "camera-at", place(*camera_at)),
             setting(Pixels, "picture.look_at", "look-at", place(*look_at)),
+            setting(Pixels, "picture.up", "up", place(*up)),
             setting(Pixels, "picture.fov", "fov", optional(*fov)),
             setting(Pixels, "picture.orthographic", "orthographic", optional(*orthographic)),
             setting(Pixels, "picture.panorama", "panorama", pair(*panorama)),
@@ -163,6 +168,7 @@ impl Default for Picture {
             camera: None,
             camera_at: None,
             look_at: None,
+            up: None,
             fov: None,
             orthographic: None,
             panorama: None,

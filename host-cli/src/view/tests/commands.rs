@@ -117,7 +117,14 @@ fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
                     _ => Extent::Fov(90.0 * size),
                 };
                 let camera = (size < 0.5).then(|| "a camera".into());
-                wish.look(View { camera, position: place(1e3), look_at: place(1e-6), shown });
+                wish.look(View {
+                    camera,
+                    position: place(1e3),
+                    look_at: place(1e-6),
+                    up: None,
+                    shift: None,
+                    shown,
+                });
             }
             change if change < 0.0 => wish.set("lamp \"x\".emission".into(), place(1e20).to_vec()),
             change if change < 0.2 => wish.set("a.exponent".into(), vec![place(1e-20)[0].abs()]),
@@ -175,7 +182,8 @@ fn numbers_and_words_survive_a_shell() {
     let view = view_options(&["it's a scene.gltf".into()]);
     let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
     let (position, look_at) = ([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0]);
-    wish.look(View { camera: None, position, look_at, shown: Extent::Fov(33.3) });
+    let (up, shift) = (Some([0.0, -1e-7, 1.0]), Some([0.1, -0.3]));
+    wish.look(View { camera: None, position, look_at, up, shift, shown: Extent::Fov(33.3) });
     let line = quoted(&words(&view.scene, view.quality, view.finish(), &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");
     let shell = std::process::Command::new("sh").arg("-c").arg(format!("printf '%s\\n' {line}")).output();
