@@ -1,0 +1,495 @@
+"""Values of node sockets: the same everywhere, or given by the texels of an image."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from .images import linear_pixels
+from .nodes import Place, Unsupported, input_of, resolve
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Texture coordinates: a UV map, by default the active one, and glTF's transform of it."""
+
+    uv_map: str = ""
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    wrap: str = "REPEAT"
+    is_nearest: bool = False
+
+
+@dataclass(frozen=True)
+class Value:
+    """A colour with alpha, or a number in all four: linear."""
+
+    texels: np.ndarray
+    """Of the shape (4,), or (height, width, 4) with the bottom line first."""
+    mapping: Mapping | None = None
+    image: bpy.types.Image | None = None
+    """The one image that the texels are computed from."""
+    colours: str | None = None
+    """Colour attribute that is a factor of the value."""
+
+    @property
+    def is_constant(self) -> bool:
+        """True for a value that is the same everywhere."""
+        return self.mapping is None and self.colours is None
+
+    @property
+    def number(self) -> float:
+        """A constant as a number."""
+        return float(self.texels[..., 0].mean())
+
+    @property
+    def colour(self) -> tuple[float, float, float]:
+        """A constant as a colour; of a texture the mean."""
+        red, green, blue = self.texels[..., :3].reshape(-1, 3).mean(axis=0).tolist()
+        return red, green, blue
+
+    def map(self, function: Callable[[np.ndarray], np.ndarray]) -> Value:
+        """The value of a function of the texels."""
+        return replace(self, texels=function(self.texels))
+
+
+def constant(value: object) -> Value:
+    """A constant of a number or of a tuple of three or four."""
+    numbers = np.atleast_1d(np.array(value, np.float32))
+    if len(numbers) == 1:
+        numbers = np.repeat(numbers, 4)
+    elif len(numbers) == 3:
+        numbers = np.append(numbers, np.float32(1))
+    return Value(numbers)
+
+
+def constant_of(place: Place) -> tuple[float, float, float, float]:
+    """Value of an input that is to be the same everywhere.
+
+    Raises `Unsupported`.
+    """
+    value = value_of(place)
+    if not value.is_constant:
+        raise Unsupported(resolve(place).socket.node, "it is no constant")
+    red, green, blue, alpha = value.texels.tolist()
+    return red, green, blue, alpha
+
+
+def value_of(place: Place) -> Value:
+    """Value of an input.
+
+    Raises `Unsupported`, or `Unreadable` for an image without pixels.
+    """
+    end = resolve(place)
+    if not end.socket.is_output:
+        value = end.socket.default_value
+        return constant(value if isinstance(value, (int, float)) else tuple(value))
+    read = _READERS.get(end.socket.node.bl_idname)
+    if read is None:
+        raise Unsupported(end.socket.node)
+    value = read(end)
+    # A number that is fed by a colour is its grey value.
+    if place.socket.type == "VALUE" and end.socket.type in {"RGBA", "VECTOR"}:
+        weights = [1 / 3, 1 / 3, 1 / 3] if end.socket.type == "VECTOR" else _LUMINANCE
+        return value.map(lambda texels: _grey(texels @ np.array([*weights, 0], np.float32)))
+    return value
+
+
+_LUMINANCE = [0.2126, 0.7152, 0.0722]
+
+
+def mappings_of(*values: Value) -> set[Mapping]:
+    """The mappings of the textures among values."""
+    return {value.mapping for value in values if value.mapping is not None}
+
+
+def combine(node: bpy.types.Node, function: Callable[..., np.ndarray], *values: Value) -> Value:
+    """The value of a function of several values, of which textures have one mapping.
+
+    Raises `Unsupported`.
+    """
+    mappings = mappings_of(*values)
+    if any(value.colours is not None for value in values):
+        raise Unsupported(node, "it changes a colour attribute")
+    if len(mappings) > 1:
+        raise Unsupported(node, "it joins textures of different mappings")
+    texels = function(*of_one_size(*values))
+    images = [value.image for value in values if value.image is not None]
+    return Value(texels.astype(np.float32), next(iter(mappings), None), images[0] if len(images) == 1 else None)
+
+
+def of_one_size(*values: Value) -> list[np.ndarray]:
+    """Texels of values, those of textures in the size of the largest."""
+    sizes = [value.texels.shape[:2] for value in values if value.texels.ndim == 3]
+    if not sizes:
+        return [value.texels for value in values]
+    size = (max(height for height, _ in sizes), max(width for _, width in sizes))
+    return [_resized(value.texels, size) for value in values]
+
+
+def _resized(texels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    if texels.ndim == 1 or texels.shape[:2] == size:
+        return texels
+    rows = np.arange(size[0]) * texels.shape[0] // size[0]
+    columns = np.arange(size[1]) * texels.shape[1] // size[1]
+    return texels[rows[:, None], columns]
+
+
+def _grey(values: np.ndarray) -> np.ndarray:
+    return np.repeat(np.asarray(values, np.float32)[..., None], 4, axis=-1)
+
+
+def _with_alpha(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    alpha = np.broadcast_to(alpha, colour.shape[:-1])
+    return np.concatenate([colour[..., :3], alpha[..., None]], axis=-1)
+
+
+# --- Readers of nodes: of the output `end`.
+
+
+def _own(end: Place) -> Value:
+    value = end.socket.default_value
+    return constant(value if isinstance(value, (int, float)) else tuple(value))
+
+
+def _image(end: Place) -> Value:
+    node = end.socket.node
+    if node.image is None:
+        # Cycles shows a missing image in pink; an empty node is black.
+        return constant((0.0, 0.0, 0.0, 0.0)) if end.socket.name == "Color" else constant(0.0)
+    if node.projection != "FLAT":
+        raise Unsupported(node, f"its projection is {node.projection.title()}")
+    mapping = replace(
+        _mapping(input_of(end, "Vector")),
+        wrap=node.extension,
+        is_nearest=node.interpolation == "Closest",
+    )
+    texels = linear_pixels(node.image)
+    if end.socket.name == "Alpha":
+        return Value(_grey(texels[..., 3]), mapping, node.image)
+    return Value(texels, mapping, node.image)
+
+
+def _mapping(vector: Place) -> Mapping:
+    end = resolve(vector)
+    if not end.socket.is_output:
+        return Mapping()
+    node = end.socket.node
+    if node.bl_idname == "ShaderNodeUVMap":
+        return Mapping(node.uv_map)
+    if node.bl_idname == "ShaderNodeTexCoord" and end.socket.name == "UV":
+        return Mapping()
+    if node.bl_idname != "ShaderNodeMapping":
+        raise Unsupported(node, "textures take UV maps")
+    inner = _mapping(input_of(end, "Vector"))
+    if replace(inner, uv_map="") != Mapping():
+        raise Unsupported(node, "it follows another mapping")
+    location, turn, scale = (
+        constant_of(input_of(end, name)) if name in node.inputs and node.inputs[name].enabled else (0.0,) * 4
+        for name in ("Location", "Rotation", "Scale")
+    )
+    return replace(_transform(node, location, turn, scale), uv_map=inner.uv_map)
+
+
+def _transform(
+    node: bpy.types.Node, location: tuple[float, ...], turn: tuple[float, ...], scale: tuple[float, ...]
+) -> Mapping:
+    """glTF's transform, whose v points down, of a mapping in the plane."""
+    if any(abs(angle) > 1e-6 for angle in turn[:2]) or node.vector_type not in {"POINT", "TEXTURE", "VECTOR"}:
+        raise Unsupported(node, "it does not stay in the plane")
+    (x, y), angle, (width, height) = location[:2], turn[2], scale[:2]
+    if node.vector_type == "TEXTURE":
+        if abs(angle) > 1e-6 and abs(width - height) > 1e-6 or width == 0 or height == 0:
+            raise Unsupported(node, "its inverse is skewed")
+        sine, cosine = math.sin(-angle), math.cos(-angle)
+        x, y = -(cosine * x - sine * y) / width, -(sine * x + cosine * y) / height
+        angle, width, height = -angle, 1 / width, 1 / height
+    sine, cosine = math.sin(angle), math.cos(angle)
+    offset = (x - sine * height, 1 - cosine * height - y)
+    return Mapping(offset=offset, rotation=angle, scale=(width, height))
+
+
+def _colour_attribute(end: Place) -> Value:
+    node = end.socket.node
+    if end.socket.name != "Color":
+        raise Unsupported(node, f"its output {end.socket.name} is used")
+    is_layer = node.bl_idname == "ShaderNodeVertexColor"
+    if not is_layer and node.attribute_type != "GEOMETRY":
+        raise Unsupported(node, "it is no attribute of the geometry")
+    return Value(np.ones(4, np.float32), colours=node.layer_name if is_layer else node.attribute_name)
+
+
+def _mix(end: Place) -> Value:
+    node = end.socket.node
+    if node.data_type == "ROTATION":
+        raise Unsupported(node)
+    sockets = {socket.name: socket for socket in node.inputs if socket.enabled}
+    factor, first, second = (value_of(Place(sockets[name], end.groups)) for name in ("Factor", "A", "B"))
+    if node.clamp_factor:
+        factor = factor.map(lambda texels: np.clip(texels, 0, 1))
+    blend = node.blend_type if node.data_type == "RGBA" else "MIX"
+    is_clamped = node.data_type == "RGBA" and node.clamp_result
+    return _blended(node, blend, is_clamped, factor, first, second)
+
+
+def _mix_rgb(end: Place) -> Value:
+    node = end.socket.node
+    factor, first, second = (value_of(input_of(end, name)) for name in ("Fac", "Color1", "Color2"))
+    return _blended(node, node.blend_type, node.use_clamp, factor, first, second)
+
+
+def _blended(
+    node: bpy.types.Node, kind: str, is_clamped: bool, factor: Value, first: Value, second: Value
+) -> Value:
+    if kind == "MULTIPLY" and factor.is_constant and factor.number == 1 and not is_clamped:
+        product = _product_with_colours(first, second)
+        if product is not None:
+            return product
+    blend = _BLENDS.get(kind)
+    if blend is None:
+        raise Unsupported(node, f"its mode is {kind.replace('_', ' ').title()}")
+
+    def mixed(t: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        a, b, t = np.broadcast_arrays(a, b, t)
+        result = a + t * (blend(a, b) - a)
+        result = _with_alpha(result, a[..., 3] if kind != "MIX" else result[..., 3])
+        return np.clip(result, 0, 1) if is_clamped else result
+
+    return combine(node, mixed, factor, first, second)
+
+
+def _product_with_colours(first: Value, second: Value) -> Value | None:
+    """Product of a colour attribute and another value, which glTF states as it is."""
+    for one, other in ((first, second), (second, first)):
+        if one.colours is not None and other.colours is None and one.mapping is None:
+            return replace(other.map(lambda texels: texels * one.texels), colours=one.colours)
+    return None
+
+
+_BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "MIX": lambda a, b: b,
+    "ADD": lambda a, b: a + b,
+    "MULTIPLY": lambda a, b: a * b,
+    "SUBTRACT": lambda a, b: a - b,
+    "DARKEN": np.minimum,
+    "LIGHTEN": np.maximum,
+    "SCREEN": lambda a, b: 1 - (1 - a) * (1 - b),
+    "DIFFERENCE": lambda a, b: np.abs(a - b),
+    "DIVIDE": lambda a, b: np.where(b != 0, a / np.where(b != 0, b, 1), a),
+    "OVERLAY": lambda a, b: np.where(a < 0.5, 2 * a * b, 1 - 2 * (1 - a) * (1 - b)),
+}
+
+
+def _math(end: Place) -> Value:
+    node = end.socket.node
+    function = _FUNCTIONS.get(node.operation)
+    if function is None:
+        raise Unsupported(node, f"its operation is {node.operation.replace('_', ' ').title()}")
+    inputs = [Place(socket, end.groups) for socket in node.inputs if socket.enabled]
+    values = [value_of(place) for place in inputs]
+    result = combine(node, function, *values)
+    return result.map(lambda texels: np.clip(texels, 0, 1)) if node.use_clamp else result
+
+
+def _safe_power(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.power(np.maximum(a, 0), b)
+
+
+_FUNCTIONS: dict[str, Callable[..., np.ndarray]] = {
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "MULTIPLY": lambda a, b: a * b,
+    "DIVIDE": lambda a, b: np.where(b != 0, a / np.where(b != 0, b, 1), 0),
+    "MULTIPLY_ADD": lambda a, b, c: a * b + c,
+    "POWER": _safe_power,
+    "SQRT": lambda a: np.sqrt(np.maximum(a, 0)),
+    "ABSOLUTE": np.abs,
+    "MINIMUM": np.minimum,
+    "MAXIMUM": np.maximum,
+    "LESS_THAN": lambda a, b: (a < b).astype(np.float32),
+    "GREATER_THAN": lambda a, b: (a > b).astype(np.float32),
+}
+
+
+def _invert(end: Place) -> Value:
+    factor, colour = (value_of(input_of(end, name)) for name in ("Fac", "Color"))
+    return combine(
+        end.socket.node, lambda t, a: _with_alpha(a + t * (1 - 2 * a), a[..., 3]), factor, colour
+    )
+
+
+def _gamma(end: Place) -> Value:
+    colour, gamma = (value_of(input_of(end, name)) for name in ("Color", "Gamma"))
+    return combine(end.socket.node, lambda a, b: _with_alpha(_safe_power(a, b), a[..., 3]), colour, gamma)
+
+
+def _bright_contrast(end: Place) -> Value:
+    colour, bright, contrast = (value_of(input_of(end, name)) for name in ("Color", "Bright", "Contrast"))
+
+    def changed(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+        return _with_alpha(np.maximum((1 + c) * a + b - 0.5 * c, 0), a[..., 3])
+
+    return combine(end.socket.node, changed, colour, bright, contrast)
+
+
+def _hue_saturation(end: Place) -> Value:
+    names = ("Hue", "Saturation", "Value", "Fac", "Color")
+
+    def changed(
+        hue: np.ndarray, saturation: np.ndarray, value: np.ndarray, factor: np.ndarray, colour: np.ndarray
+    ) -> np.ndarray:
+        turned = _hsv(colour)
+        turned[..., 0] = (turned[..., 0] + hue[..., 0] + 0.5) % 1
+        turned[..., 1] = np.clip(turned[..., 1] * saturation[..., 0], 0, 1)
+        turned[..., 2] = turned[..., 2] * value[..., 0]
+        mixed = colour[..., :3] + factor[..., :3] * (_rgb(turned) - colour[..., :3])
+        return _with_alpha(np.maximum(mixed, 0), colour[..., 3])
+
+    return combine(end.socket.node, changed, *(value_of(input_of(end, name)) for name in names))
+
+
+def _hsv(colour: np.ndarray) -> np.ndarray:
+    red, green, blue = (colour[..., channel] for channel in range(3))
+    high, low = colour[..., :3].max(axis=-1), colour[..., :3].min(axis=-1)
+    span = np.where(high > low, high - low, 1)
+    hue = np.select(
+        [high == red, high == green], [(green - blue) / span % 6, (blue - red) / span + 2],
+        (red - green) / span + 4,
+    )
+    hue = np.where(high > low, hue / 6, 0)
+    return np.stack([hue, np.where(high > 0, (high - low) / np.where(high > 0, high, 1), 0), high], axis=-1)
+
+
+def _rgb(hsv: np.ndarray) -> np.ndarray:
+    hue, saturation, value = (hsv[..., channel] for channel in range(3))
+    shifts = np.array([5.0, 3.0, 1.0], np.float32)
+    k = (shifts + hue[..., None] * 6) % 6
+    ramp = np.clip(np.minimum(k, 4 - k), 0, 1)
+    return value[..., None] * (1 - saturation[..., None] * ramp)
+
+
+def _curves(end: Place) -> Value:
+    node = end.socket.node
+    node.mapping.initialize()
+    steps = np.linspace(0, 1, 257)
+    tables = [
+        np.array([node.mapping.evaluate(node.mapping.curves[channel], step) for step in steps])
+        for channel in range(4)
+    ]
+
+    def changed(factor: np.ndarray, colour: np.ndarray) -> np.ndarray:
+        combined = np.interp(colour[..., :3], steps, tables[3])
+        curved = np.stack(
+            [np.interp(combined[..., channel], steps, tables[channel]) for channel in range(3)], axis=-1
+        )
+        return _with_alpha(colour[..., :3] + factor[..., :3] * (curved - colour[..., :3]), colour[..., 3])
+
+    return combine(node, changed, *(value_of(input_of(end, name)) for name in ("Fac", "Color")))
+
+
+def _ramp(end: Place) -> Value:
+    node = end.socket.node
+    steps = np.linspace(0, 1, 1025)
+    table = np.array([tuple(node.color_ramp.evaluate(step)) for step in steps])
+
+    def changed(factor: np.ndarray) -> np.ndarray:
+        channels = [np.interp(factor[..., 0], steps, table[:, channel]) for channel in range(4)]
+        colour = np.stack(channels, axis=-1)
+        return _grey(colour[..., 3]) if end.socket.name == "Alpha" else colour
+
+    return combine(node, changed, value_of(input_of(end, "Fac")))
+
+
+def _grey_value(end: Place) -> Value:
+    value = value_of(input_of(end, "Color"))
+    return combine(end.socket.node, lambda a: _grey(a[..., :3] @ np.array(_LUMINANCE, np.float32)), value)
+
+
+def _separate(end: Place) -> Value:
+    node = end.socket.node
+    colour = value_of(Place(node.inputs[0], end.groups))
+    channel = [socket.identifier for socket in node.outputs].index(end.socket.identifier)
+    is_hsv = getattr(node, "mode", "RGB") == "HSV"
+    if getattr(node, "mode", "RGB") not in {"RGB", "HSV"}:
+        raise Unsupported(node, f"its mode is {node.mode}")
+    return combine(node, lambda a: _grey((_hsv(a) if is_hsv else a)[..., channel]), colour)
+
+
+def _join(end: Place) -> Value:
+    node = end.socket.node
+    if getattr(node, "mode", "RGB") not in {"RGB", "HSV"}:
+        raise Unsupported(node, f"its mode is {node.mode}")
+
+    def joined(*channels: np.ndarray) -> np.ndarray:
+        stacked = np.stack(np.broadcast_arrays(*(channel[..., 0] for channel in channels)), axis=-1)
+        colour = _rgb(stacked) if getattr(node, "mode", "RGB") == "HSV" else stacked
+        return _with_alpha(colour, np.float32(1))
+
+    return combine(node, joined, *(value_of(Place(socket, end.groups)) for socket in node.inputs))
+
+
+def _map_range(end: Place) -> Value:
+    node = end.socket.node
+    if node.data_type != "FLOAT" or node.interpolation_type != "LINEAR":
+        raise Unsupported(node, "it is not linear in numbers")
+    names = ("Value", "From Min", "From Max", "To Min", "To Max")
+
+    def changed(value: np.ndarray, *limits: np.ndarray) -> np.ndarray:
+        low, high, to_low, to_high = limits
+        span = np.where(high != low, high - low, 1)
+        share = (value - low) / span
+        return to_low + (np.clip(share, 0, 1) if node.clamp else share) * (to_high - to_low)
+
+    return combine(node, changed, *(value_of(Place(node.inputs[name], end.groups)) for name in names))
+
+
+def _clamp(end: Place) -> Value:
+    if end.socket.node.clamp_type != "MINMAX":
+        raise Unsupported(end.socket.node, "it is of the type Range")
+    values = (value_of(input_of(end, name)) for name in ("Value", "Min", "Max"))
+    return combine(end.socket.node, lambda a, low, high: np.minimum(np.maximum(a, low), high), *values)
+
+
+def _light_path(end: Place) -> Value:
+    """Rays of the camera stand for all."""
+    return constant(1.0 if end.socket.name == "Is Camera Ray" else 0.0)
+
+
+def _geometry(end: Place) -> Value:
+    if end.socket.name != "Backfacing":
+        raise Unsupported(end.socket.node, f"its output {end.socket.name} is used")
+    return constant(0.0)
+
+
+_READERS: dict[str, Callable[[Place], Value]] = {
+    "ShaderNodeRGB": _own,
+    "ShaderNodeValue": _own,
+    "ShaderNodeTexImage": _image,
+    "ShaderNodeVertexColor": _colour_attribute,
+    "ShaderNodeAttribute": _colour_attribute,
+    "ShaderNodeMix": _mix,
+    "ShaderNodeMixRGB": _mix_rgb,
+    "ShaderNodeMath": _math,
+    "ShaderNodeInvert": _invert,
+    "ShaderNodeGamma": _gamma,
+    "ShaderNodeBrightContrast": _bright_contrast,
+    "ShaderNodeHueSaturation": _hue_saturation,
+    "ShaderNodeRGBCurve": _curves,
+    "ShaderNodeValToRGB": _ramp,
+    "ShaderNodeRGBToBW": _grey_value,
+    "ShaderNodeSeparateColor": _separate,
+    "ShaderNodeSeparateRGB": _separate,
+    "ShaderNodeSeparateXYZ": _separate,
+    "ShaderNodeCombineColor": _join,
+    "ShaderNodeCombineRGB": _join,
+    "ShaderNodeCombineXYZ": _join,
+    "ShaderNodeMapRange": _map_range,
+    "ShaderNodeClamp": _clamp,
+    "ShaderNodeLightPath": _light_path,
+    "ShaderNodeNewGeometry": _geometry,
+}

@@ -1,0 +1,3 @@
+"""Panels"""
+def register(): pass
+def unregister(): pass
