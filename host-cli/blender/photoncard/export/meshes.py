@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -12,7 +11,6 @@ from ..glb import Glb
 from ..notices import Notices
 from .materials import MaterialExporter, MaterialUse
 
-_SURFACES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 _NOT_SURFACES = {
     "CURVES": "hair curves are not rendered",
     "POINTCLOUD": "point clouds are not rendered",
@@ -36,16 +34,15 @@ class MeshExporter:
 
         `real` is the object that states the materials: it differs from `ob` for an instance of geometry nodes.
         """
-        if ob.type not in _SURFACES:
+        if ob.type != "MESH":
+            # The faces of curves, texts, surfaces and metaballs are instances of their own, of this type.
             if ob.type in _NOT_SURFACES:
                 self._notices.add(_NOT_SURFACES[ob.type], ob.name)
             return None
         materials = _materials_of(ob, real)
-        source = ob.data if ob.type == "MESH" else ob.original
-        key = (source.as_pointer(), *(material.as_pointer() if material else 0 for material in materials))
+        key = (ob.data.as_pointer(), *(material.as_pointer() if material else 0 for material in materials))
         if key not in self._known:
-            with _mesh(ob) as mesh:
-                self._known[key] = self._add(mesh, ob.name, materials) if mesh else None
+            self._known[key] = self._add(ob.data, ob.name, materials)
         return self._known[key]
 
     def _add(
@@ -150,17 +147,6 @@ def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: in
     values = np.empty(len(items) * width, kind)
     items.foreach_get(name, values)
     return values.reshape(-1, width) if width > 1 else values
-
-
-@contextmanager
-def _mesh(ob: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
-    if ob.type == "MESH":
-        yield ob.data
-        return
-    try:
-        yield ob.to_mesh()
-    finally:
-        ob.to_mesh_clear()
 
 
 def _materials_of(ob: bpy.types.Object, real: bpy.types.Object) -> list[bpy.types.Material | None]:
