@@ -88,7 +88,7 @@ class SurfaceReader:
         try:
             return value_of(place)
         except (Unsupported, Unreadable) as reason:
-            self._note(f"{name} takes its unlinked value ({reason}); press Bake Unsupported Nodes to keep it")
+            self._note(f"{name} takes its unlinked value ({reason}); bake it to an image texture to keep it")
             value = place.socket.default_value
             return constant(value if isinstance(value, (int, float)) else tuple(value))
 
@@ -156,7 +156,7 @@ class SurfaceReader:
                 value = replace(value, mapping=replace(value.mapping, uv_map=node.uv_map))
             return NormalMap(value, constant_of(input_of(end, "Strength"))[0])
         except (Unsupported, Unreadable) as reason:
-            self._note(f"normals are those of the mesh ({reason}); press Bake Unsupported Nodes to keep them")
+            self._note(f"normals are those of the mesh ({reason}); bake them to an image texture to keep them")
             return None
 
     def _diffuse(self, end: Place) -> Surface:

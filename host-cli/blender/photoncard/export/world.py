@@ -56,7 +56,7 @@ def world_of(world: bpy.types.World | None, notices: Notices) -> World:
     try:
         found = _of_nodes(world.node_tree)
     except (Unsupported, Unreadable) as reason:
-        notices.add(f"the world's light is left out ({reason}); press Bake World in the render settings", world.name)
+        notices.add(f"the world's light is left out ({reason}); give it a colour or an equirectangular Environment Texture", world.name)
         return World()
     found.light_group = group
     return found
