@@ -82,7 +82,7 @@ class _Picture:
         run = command.Run(command.render_command(program, arguments, self._settings(), output), folder)
         try:
             while not run.is_over:
-                if self._engine.test_break():
+                if self._is_cancelled():
                     return
                 self._take(run.received(_INTERVAL))
         finally:
@@ -91,6 +91,9 @@ class _Picture:
         self._engine.update_stats("", "Reading the picture")
         self._show(exr.read(output))
         self._engine.update_progress(1.0)
+
+    def _is_cancelled(self) -> bool:
+        return self._engine.test_break()
 
     def _settings(self) -> command.Settings:
         frame = self._frame

@@ -10,12 +10,12 @@ WIDEST_SPOT = math.pi / 2
 def point_intensity(power: float, radius: float, is_normalized: bool = True) -> float:
     """Radiant intensity, W/sr, of a point or spot light of `power` watts.
 
-    A light that is not normalized has the radiance that one with a cross-section of 1 m^2 has.
+    A light that is not normalized has the radiance of one whose sphere has 1 m^2.
     """
     intensity = power / (4 * math.pi)
     if is_normalized or radius <= 0:
         return intensity
-    return intensity * math.pi * radius**2
+    return intensity * 4 * math.pi * radius**2
 
 
 def sun_irradiance(strength: float, angle: float, is_normalized: bool = True) -> float:

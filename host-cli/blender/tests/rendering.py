@@ -22,6 +22,8 @@ def passes(scene: bpy.types.Scene, engine: str, folder: Path) -> dict[str, np.nd
     if "media_type" in settings.bl_rna.properties:
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER"
+    if "use_exr_interleave" in settings.bl_rna.properties:
+        settings.use_exr_interleave = True
     settings.color_depth = "32"
     settings.exr_codec = "ZIP"
     bpy.data.images["Render Result"].save_render(str(path), scene=scene)

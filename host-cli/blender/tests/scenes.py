@@ -19,7 +19,7 @@ def clear() -> bpy.types.Scene:
             collection.remove(item)
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("world")
-    scene.world.use_nodes = True
+    use_nodes(scene.world)
     world_input(scene, "Color").default_value = (0, 0, 0, 1)
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     scene.render.resolution_percentage = 100
@@ -30,6 +30,12 @@ def clear() -> bpy.types.Scene:
     return scene
 
 
+def use_nodes(owner: bpy.types.ID) -> None:
+    """Gives a material or a world nodes; since Blender 5.0 they have them."""
+    if bpy.app.version < (5, 0, 0):
+        owner.use_nodes = True
+
+
 def world_input(scene: bpy.types.Scene, name: str) -> bpy.types.NodeSocket:
     """An input of the world's background."""
     return scene.world.node_tree.nodes["Background"].inputs[name]
@@ -38,7 +44,7 @@ def world_input(scene: bpy.types.Scene, name: str) -> bpy.types.NodeSocket:
 def material(name: str, colour: tuple[float, float, float], **inputs: object) -> bpy.types.Material:
     """A material of a Principled BSDF; `Emission_Strength=2` sets the input *Emission Strength*."""
     made = bpy.data.materials.new(name)
-    made.use_nodes = True
+    use_nodes(made)
     node = made.node_tree.nodes["Principled BSDF"]
     node.inputs["Base Color"].default_value = (*colour, 1)
     for key, value in inputs.items():

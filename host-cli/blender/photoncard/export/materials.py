@@ -8,6 +8,7 @@ from ..glb import Glb
 from ..notices import Notices
 from .images import ImageStore
 from .material_writer import MaterialUse, MaterialWriter
+from .nodes import has_nodes
 from .surfaces import Surface, SurfaceReader
 from .values import constant
 
@@ -45,7 +46,7 @@ class MaterialExporter:
     def _surface(self, material: bpy.types.Material | None, name: str) -> Surface:
         if material is None:
             return Surface(base=constant((0.8, 0.8, 0.8)))
-        if not material.use_nodes or material.node_tree is None:
+        if not has_nodes(material):
             return Surface(
                 base=constant(tuple(material.diffuse_color[:3])),
                 metallic=constant(material.metallic),

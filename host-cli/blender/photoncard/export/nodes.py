@@ -23,6 +23,11 @@ class Place(NamedTuple):
     groups: tuple[bpy.types.Node, ...]
 
 
+def has_nodes(owner: bpy.types.Material | bpy.types.World) -> bool:
+    """True if nodes state a material or a world. Since Blender 5.0 they always do."""
+    return owner.node_tree is not None and (bpy.app.version >= (5, 0, 0) or owner.use_nodes)
+
+
 def active_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     """The output node that Cycles renders."""
     return tree.get_output_node("CYCLES")

@@ -12,7 +12,7 @@ import numpy as np
 from .. import exr
 from ..notices import Notices
 from .images import Unreadable, linear_pixels
-from .nodes import Place, Unsupported, active_output, resolve
+from .nodes import Place, Unsupported, active_output, has_nodes, resolve
 from .values import constant_of
 
 _MIDDLE = -90.0
@@ -51,7 +51,7 @@ def world_of(world: bpy.types.World | None, notices: Notices) -> World:
     if world is None:
         return World()
     group = world.lightgroup
-    if not world.use_nodes or world.node_tree is None:
+    if not has_nodes(world):
         return World(tuple(world.color), light_group=group)
     try:
         found = _of_nodes(world.node_tree)

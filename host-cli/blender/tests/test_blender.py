@@ -1,0 +1,222 @@
+"""Tests in Blender: `python -m unittest test_blender` with the package bpy, and the zip in PHOTONCARD_ZIP.
+
+The zip is installed as a user installs it. Radiance is compared with that of Cycles. PHOTONCARD_PICTURES names a folder
+for pictures of both side by side.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import os
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="photoncard-user-")
+
+import bpy  # noqa: E402
+import numpy as np  # noqa: E402
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import rendering  # noqa: E402
+import scenes  # noqa: E402
+
+ZIP = os.environ.get("PHOTONCARD_ZIP", "")
+MODULE = "bl_ext.user_default.photoncard"
+# Noise of a draft and of Cycles' samples, and differences of the two models of reflection.
+TOLERANCE = 0.05
+
+
+def setUpModule() -> None:
+    """Installs the zip by Blender's own operator, and enables the extension."""
+    if not ZIP:
+        raise unittest.SkipTest("PHOTONCARD_ZIP names no zip: make one by build.py")
+    bpy.ops.preferences.addon_enable(module="cycles")
+    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+
+
+def draft(scene: bpy.types.Scene) -> bpy.types.Scene:
+    """The scene with a quick quality, rendered by photoncard."""
+    scene.render.engine = "PHOTONCARD"
+    scene.photoncard.quality = "draft"
+    rendering.use_cycles(scene, 64)
+    return scene
+
+
+class Pictures(unittest.TestCase):
+    def compare(self, scene: bpy.types.Scene, name: str) -> dict[str, np.ndarray]:
+        """Renders a scene by both engines, and compares the mean radiance."""
+        with tempfile.TemporaryDirectory() as folder:
+            ours = rendering.passes(scene, "PHOTONCARD", Path(folder))
+            theirs = rendering.passes(scene, "CYCLES", Path(folder))
+        pictures = os.environ.get("PHOTONCARD_PICTURES")
+        if pictures:
+            rendering.save_png(Path(pictures) / f"{name}.png", rendering.colour(ours), rendering.colour(theirs))
+        mean, expected = (rendering.colour(each).mean(axis=(0, 1)) for each in (ours, theirs))
+        print(f"{name}: {mean} beside {expected} of Cycles", file=sys.stderr)
+        np.testing.assert_allclose(mean, expected, rtol=TOLERANCE)
+        np.testing.assert_allclose(ours["Combined.A"], theirs["Combined.A"], atol=0.2)
+        return ours
+
+    def test_an_orthographic_plan_has_the_radiance_of_cycles(self) -> None:
+        self.compare(draft(scenes.plan()), "plan")
+
+    def test_a_product_shot_has_the_radiance_of_cycles(self) -> None:
+        channels = self.compare(draft(scenes.product()), "product")
+        self.assertLess(channels["Combined.A"].min(), 0.01)
+
+    def test_a_furnished_room_has_the_radiance_of_cycles(self) -> None:
+        self.compare(draft(scenes.room()), "room")
+
+
+class Passes(unittest.TestCase):
+    def test_all_passes_are_there_with_their_values(self) -> None:
+        scene = draft(scenes.plan())
+        layer = bpy.context.view_layer
+        named = ("use_pass_z", "use_pass_normal", "use_pass_position", "use_pass_cryptomatte_object",
+                 "use_pass_cryptomatte_material")
+        own = ("use_pass_direct", "use_pass_indirect", "use_pass_caustics", "use_pass_albedo")
+        for owner, names in ((layer, named), (layer.photoncard, own)):
+            for name in names:
+                setattr(owner, name, True)
+        bpy.ops.scene.view_layer_add_lightgroup(name="sky")
+        bpy.ops.scene.view_layer_add_lightgroup(name="sun")
+        scene.world.lightgroup, bpy.data.objects["sun"].lightgroup = "sky", "sun"
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                channels = rendering.passes(scene, "PHOTONCARD", Path(folder))
+        finally:
+            for owner, names in ((layer, named), (layer.photoncard, own)):
+                for name in names:
+                    setattr(owner, name, False)
+        combined = rendering.colour(channels)
+        parts = sum(rendering.colour(channels, name) for name in ("Direct", "Indirect", "Caustics"))
+        np.testing.assert_allclose(parts, combined, rtol=1e-3, atol=1e-4)
+        groups = [rendering.colour(channels, f"Combined_{name}") for name in ("sky", "sun")]
+        self.assertTrue(all(group.mean() > 0.01 for group in groups))
+        self.assertTrue((groups[0] + groups[1] <= combined + 1e-4).all())
+        # The ground is 8 m below the camera, and faces it.
+        corner = (scenes.HEIGHT - 3, scenes.WIDTH - 3)
+        self.assertAlmostEqual(float(channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"][corner]), 8, delta=0.01)
+        np.testing.assert_allclose([channels[f"Normal.{axis}"][corner] for axis in "XYZ"], (0, 0, 1), atol=1e-3)
+        # The picture is 7 m wide, its middle at 0.3 m plus a shift of 0.35 m.
+        across = 0.3 + 0.35 + 7 * ((scenes.WIDTH - 2.5) / scenes.WIDTH - 0.5)
+        self.assertAlmostEqual(float(channels["Position.X"][corner]), across, delta=0.03)
+        self.assertAlmostEqual(float(channels["Position.Z"][corner]), 0, delta=1e-3)
+        albedo = [channels[f"Denoising Albedo.{channel}"][corner] for channel in "RGB"]
+        np.testing.assert_allclose(albedo, (0.6, 0.6, 0.55), atol=0.02)
+        ids = channels["CryptoObject00.R" if "CryptoObject00.R" in channels else "CryptoObject00.r"]
+        self.assertGreaterEqual(len(np.unique(ids)), 4)
+
+
+class Brightness(unittest.TestCase):
+    """Numbers of the exported lights beside what Cycles renders of each."""
+
+    HEIGHT = 4.0
+    CASES = (
+        ("POINT", {"energy": 60.0, "shadow_soft_size": 0.0}),
+        ("POINT", {"energy": 60.0, "shadow_soft_size": 0.2, "normalize": False}),
+        ("SPOT", {"energy": 60.0, "shadow_soft_size": 0.05}),
+        ("SUN", {"energy": 3.0, "angle": 0.02}),
+        ("SUN", {"energy": 3000.0, "angle": 0.1, "normalize": False}),
+        ("AREA", {"energy": 40.0, "size": 0.2}),
+        ("AREA", {"energy": 40.0, "size": 0.2, "shape": "ELLIPSE", "size_y": 0.1, "exposure": 1.0}),
+        ("AREA", {"energy": 40.0, "size": 0.2, "shape": "RECTANGLE", "size_y": 0.1, "normalize": False}),
+        ("POINT", {"energy": 60.0, "shadow_soft_size": 0.0, "use_temperature": True, "temperature": 3000.0}),
+    )
+
+    def test_lights_have_the_numbers_that_cycles_renders(self) -> None:
+        objects = importlib.import_module(f"{MODULE}.export.objects")
+        cameras = importlib.import_module(f"{MODULE}.export.camera")
+        for kind, properties in self.CASES:
+            known = getattr(bpy.types, f"{kind.title()}Light").bl_rna.properties
+            if not properties.keys() <= set(known.keys()):
+                # Blender 4.2 has no exposure, temperature and normalization of lights.
+                continue
+            with self.subTest(kind=kind, **properties):
+                scene = scenes.clear()
+                scenes.quad("floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], scenes.matte("floor", (0.5, 0.5, 0.5)))
+                scenes.lamp("lamp", kind, (0, 0, self.HEIGHT), **properties)
+                scenes.camera((0, 0, 2), (0, 0, 0), type="ORTHO", ortho_scale=0.05)
+                rendering.use_cycles(scene, 256)
+                scene.render.resolution_x = scene.render.resolution_y = 16
+                graph = bpy.context.evaluated_depsgraph_get()
+                exported = objects.export(graph, scene.camera, cameras.frame_of(scene.render)).glb.root
+                with tempfile.TemporaryDirectory() as folder:
+                    seen = rendering.colour(rendering.passes(scene, "CYCLES", Path(folder))).mean(axis=(0, 1))
+                expected = 0.5 / math.pi * self.irradiance(exported)
+                np.testing.assert_allclose(seen, expected, rtol=0.02)
+
+    def irradiance(self, root: dict) -> np.ndarray:
+        """Irradiance of the floor below the light of a document."""
+        lights = root.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
+        if lights:
+            value = np.array(lights[0]["color"]) * lights[0]["intensity"]
+            return value if lights[0]["type"] == "directional" else value / self.HEIGHT**2
+        node = next(node for node in root["nodes"] if node["name"] == "lamp")
+        area = node["extras"]["photoncard"]["area_light"]
+        size = math.prod(area["size"]) * (math.pi / 4 if area["shape"] == "ellipse" else 1)
+        return np.array(area["radiance"]) * size / self.HEIGHT**2
+
+
+class Failures(unittest.TestCase):
+    def test_a_scene_without_a_camera_says_what_helps(self) -> None:
+        scene = draft(scenes.plan())
+        scene.camera = None
+        engine = importlib.import_module(f"{MODULE}.export.camera")
+        graph = bpy.context.evaluated_depsgraph_get()
+        objects = importlib.import_module(f"{MODULE}.export.objects")
+        with self.assertRaisesRegex(engine.CameraError, "add one"):
+            objects.export(graph, None, engine.frame_of(scene.render))
+
+    def test_a_failed_run_shows_the_remedy(self) -> None:
+        scene = draft(scenes.plan())
+        scene.photoncard.cards.add().address = "tcp:nowhere.invalid:1"
+        try:
+            with self.assertRaisesRegex(RuntimeError, "nowhere.invalid"):
+                bpy.ops.render.render()
+        finally:
+            scene.photoncard.cards.clear()
+
+    def test_a_cancelled_render_ends_the_program(self) -> None:
+        engine = importlib.import_module(f"{MODULE}.engine")
+        command = importlib.import_module(f"{MODULE}.command")
+        runs, started = [], time.monotonic()
+
+        class Watched(command.Run):
+            def __init__(self, *arguments: object) -> None:
+                super().__init__(*arguments)
+                runs.append(self)
+
+        scene = draft(scenes.room())
+        scene.photoncard.quality = "final"
+        stop = lambda _: bool(runs) and time.monotonic() - started > 3  # noqa: E731
+        whole, engine.command.Run = engine.command.Run, Watched
+        whole_check, engine._Picture._is_cancelled = engine._Picture._is_cancelled, stop
+        try:
+            bpy.ops.render.render()
+        finally:
+            engine.command.Run = whole
+            engine._Picture._is_cancelled = whole_check
+        self.assertLess(time.monotonic() - started, 3 + 10)
+        self.assertIsNotNone(runs[0]._process.poll())
+        self.assertNotEqual(runs[0]._process.returncode, 0)
+
+
+def tearDownModule() -> None:
+    """Leaves nothing behind."""
+    import shutil
+
+    shutil.rmtree(os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
+
+
+if __name__ == "__main__":
+    # The package bpy may hang when the interpreter ends.
+    result = unittest.main(exit=False).result
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0 if result.wasSuccessful() else 1)
