@@ -100,11 +100,11 @@ class Passes(unittest.TestCase):
         self.assertTrue(all(group.mean() > 0.01 for group in groups))
         self.assertTrue((groups[0] + groups[1] <= combined + 1e-4).all())
         # The ground is 8 m below the camera, and faces it.
-        corner = (scenes.HEIGHT - 3, scenes.WIDTH - 3)
+        corner = (scenes.HEIGHT - 3, 3)
         self.assertAlmostEqual(float(channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"][corner]), 8, delta=0.01)
         np.testing.assert_allclose([channels[f"Normal.{axis}"][corner] for axis in "XYZ"], (0, 0, 1), atol=1e-3)
         # The picture is 7 m wide, its middle at 0.3 m plus a shift of 0.35 m.
-        across = 0.3 + 0.35 + 7 * ((scenes.WIDTH - 2.5) / scenes.WIDTH - 0.5)
+        across = 0.3 + 0.35 + 7 * (3.5 / scenes.WIDTH - 0.5)
         self.assertAlmostEqual(float(channels["Position.X"][corner]), across, delta=0.03)
         self.assertAlmostEqual(float(channels["Position.Z"][corner]), 0, delta=1e-3)
         albedo = [channels[f"Denoising Albedo.{channel}"][corner] for channel in "RGB"]
