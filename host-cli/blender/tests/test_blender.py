@@ -163,6 +163,94 @@ class Brightness(unittest.TestCase):
         return np.array(area["radiance"]) * size / self.HEIGHT**2
 
 
+class Nodes(unittest.TestCase):
+    """Values of node chains on an image beside what Cycles renders of them."""
+
+    def board(self, tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+        node = tree.nodes.new("ShaderNodeTexImage")
+        pixels = scenes.checker()
+        pixels[:32, :, :3] *= (0.5, 1, 0.8)
+        node.image = scenes.image("board", pixels)
+        node.interpolation = "Closest"
+        mapping = tree.nodes.new("ShaderNodeMapping")
+        mapping.inputs["Location"].default_value = (0.3, 0.1, 0)
+        mapping.inputs["Rotation"].default_value = (0, 0, 0.4)
+        mapping.inputs["Scale"].default_value = (2, 1.5, 1)
+        uv = tree.nodes.new("ShaderNodeUVMap")
+        tree.links.new(uv.outputs["UV"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+        return node.outputs["Color"]
+
+    def chain(self, tree: bpy.types.NodeTree, kind: str, settings: dict, inputs: dict, out: int) -> bpy.types.NodeSocket:
+        node = tree.nodes.new(kind)
+        for name, value in settings.items():
+            setattr(node, name, value)
+        for number, value in inputs.items():
+            socket = [each for each in node.inputs if each.enabled][number]
+            if value == "board":
+                tree.links.new(self.board(tree), socket)
+            else:
+                socket.default_value = value
+        return [each for each in node.outputs if each.enabled][out]
+
+    CHAINS = (
+        ("ShaderNodeGamma", {}, {0: "board", 1: 2.0}, 0),
+        ("ShaderNodeInvert", {}, {0: 0.7, 1: "board"}, 0),
+        ("ShaderNodeBrightContrast", {}, {0: "board", 1: 0.1, 2: 0.3}, 0),
+        ("ShaderNodeHueSaturation", {}, {0: 0.6, 1: 1.3, 2: 0.8, 3: 0.9, 4: "board"}, 0),
+        ("ShaderNodeRGBToBW", {}, {0: "board"}, 0),
+        ("ShaderNodeValToRGB", {}, {0: "board"}, 0),
+        ("ShaderNodeMath", {"operation": "MULTIPLY_ADD"}, {0: "board", 1: 0.5, 2: 0.2}, 0),
+        ("ShaderNodeMath", {"operation": "POWER"}, {0: "board", 1: 1.7}, 0),
+        ("ShaderNodeSeparateColor", {}, {0: "board"}, 1),
+        ("ShaderNodeSeparateColor", {"mode": "HSV"}, {0: "board"}, 1),
+        ("ShaderNodeCombineColor", {}, {0: 0.1, 1: "board", 2: 0.4}, 0),
+        ("ShaderNodeMapRange", {}, {0: "board", 1: 0.2, 2: 0.6, 3: 0.1, 4: 0.9}, 0),
+        ("ShaderNodeClamp", {}, {0: "board", 1: 0.3, 2: 0.5}, 0),
+        ("ShaderNodeRGBCurve", {}, {0: 0.8, 1: "board"}, 0),
+        *(("ShaderNodeMix", {"data_type": "RGBA", "blend_type": mode}, {0: 0.6, 1: "board", 2: (0.5, 0.3, 0.7, 1)}, 0)
+          for mode in ("MIX", "ADD", "MULTIPLY", "SUBTRACT", "SCREEN", "DIFFERENCE", "DIVIDE", "OVERLAY", "DARKEN", "LIGHTEN")),
+        ("ShaderNodeMix", {"data_type": "FLOAT"}, {0: "board", 1: 0.2, 2: 0.9}, 0),
+    )
+
+    def test_chains_have_the_mean_that_cycles_renders(self) -> None:
+        values = importlib.import_module(f"{MODULE}.export.values")
+        nodes = importlib.import_module(f"{MODULE}.export.nodes")
+        for kind, settings, inputs, out in self.CHAINS:
+            with self.subTest(kind=kind, **settings):
+                scene = scenes.clear()
+                made = bpy.data.materials.new("chain")
+                scenes.use_nodes(made)
+                tree = made.node_tree
+                emission = tree.nodes.new("ShaderNodeEmission")
+                tree.links.new(self.chain(tree, kind, settings, inputs, out), emission.inputs["Color"])
+                tree.links.new(emission.outputs["Emission"], tree.nodes["Material Output"].inputs["Surface"])
+                scenes.quad("quad", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], made)
+                scenes.camera((0, 0, 2), (0, 0, 0), type="ORTHO", ortho_scale=2)
+                rendering.use_cycles(scene, 4)
+                scene.cycles.pixel_filter_type = "BOX"
+                scene.render.resolution_x = scene.render.resolution_y = 64
+                with tempfile.TemporaryDirectory() as folder:
+                    seen = rendering.colour(rendering.passes(scene, "CYCLES", Path(folder)))
+                value = values.value_of(nodes.Place(emission.inputs["Color"], ()))
+                # Pixels at the edges of texels have four samples of Cycles.
+                differs = np.abs(seen - self.shown(value)).max(axis=2) > 0.05
+                self.assertLess(differs.mean(), 0.25)
+                np.testing.assert_allclose(seen.mean(axis=(0, 1)), self.shown(value).mean(axis=(0, 1)), atol=0.006)
+
+    def shown(self, value: object) -> np.ndarray:
+        """The picture of a value on the quad, by glTF's transform of texture coordinates, the top line first."""
+        mapping, side = value.mapping, 256
+        v, u = (np.indices((side, side)) + 0.5) / side
+        sine, cosine = math.sin(mapping.rotation), math.cos(mapping.rotation)
+        width, height = mapping.scale
+        across = cosine * width * u + sine * height * v + mapping.offset[0]
+        down = -sine * width * u + cosine * height * v + mapping.offset[1]
+        texels = value.texels[::-1, :, :3]
+        rows, columns = (np.floor(place % 1 * 64).astype(int) for place in (down, across))
+        return texels[rows, columns].reshape(64, 4, 64, 4, 3).mean(axis=(1, 3))
+
+
 class Failures(unittest.TestCase):
     def test_a_scene_without_a_camera_says_what_helps(self) -> None:
         scene = draft(scenes.plan())
