@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from . import command, events, exr
+from .baking import bake_world
 from .export.camera import CameraError, Frame, frame_of
 from .export.objects import Exported, export
 from .glb import TooLarge
@@ -70,7 +71,7 @@ class _Picture:
         program = command.find(program_stated(), os.path.dirname(__file__))
         engine.update_stats("", "Exporting the scene")
         camera = engine.camera_override or self._scene.camera
-        exported = export(self._depsgraph, camera, self._frame)
+        exported = export(self._depsgraph, camera, self._frame, bake_world if self._scene.photoncard.use_bake else None)
         for line in exported.notices.lines():
             engine.report({"WARNING"}, line)
         with tempfile.TemporaryDirectory(prefix="photoncard-", dir=bpy.app.tempdir) as folder:

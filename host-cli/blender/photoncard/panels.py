@@ -118,7 +118,9 @@ class PHOTONCARD_PT_film(_Panel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Shows the settings."""
-        self._split().prop(context.scene.render, "film_transparent")
+        layout = self._split()
+        layout.prop(context.scene.render, "film_transparent")
+        layout.prop(context.scene.photoncard, "use_bake")
 
 
 class PHOTONCARD_PT_passes(_Panel, bpy.types.Panel):

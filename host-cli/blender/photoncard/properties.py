@@ -65,6 +65,11 @@ class SceneSettings(bpy.types.PropertyGroup):
     caustic_photons: IntProperty(
         name="Photons", description="Photons in the caustic map", default=500_000, min=1, max=100_000_000
     )
+    use_bake: BoolProperty(
+        name="Bake World Nodes",
+        description="Render a Sky Texture and other nodes of the world to a map, by Cycles, before each frame",
+        default=True,
+    )
     cards: CollectionProperty(type=Card)
 
     def command_settings(self, size: tuple[int, int]) -> Settings:

@@ -15,7 +15,7 @@ from .camera import Frame, add_camera
 from .lights import add_light
 from .materials import MaterialExporter
 from .meshes import MeshExporter
-from .world import World, world_of
+from .world import Bake, World, world_of
 
 _RAYS = ("diffuse", "glossy", "transmission", "shadow")
 
@@ -45,8 +45,10 @@ class Exported:
         return arguments
 
 
-def export(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object | None, frame: Frame) -> Exported:
-    """Exports an evaluated scene as its view layer shows it to a camera.
+def export(
+    depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object | None, frame: Frame, bake: Bake | None = None
+) -> Exported:
+    """Exports an evaluated scene as its view layer shows it to a camera. `bake` renders nodes of the world.
 
     Raises `CameraError`.
     """
@@ -62,7 +64,7 @@ def export(depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object | None, fram
     world = depsgraph.view_layer.world_override if hasattr(depsgraph.view_layer, "world_override") else None
     return Exported(
         exporter.glb,
-        world_of(world or scene.world, exporter.notices),
+        world_of(world or scene.world, bake, exporter.notices),
         exporter.light_groups,
         exporter.notices,
         exporter.materials.energy_compensation,

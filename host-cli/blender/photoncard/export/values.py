@@ -162,6 +162,8 @@ def _image(end: Place) -> Value:
     if node.image is None:
         # Cycles shows a missing image in pink; an empty node is black.
         return constant((0.0, 0.0, 0.0, 0.0)) if end.socket.name == "Color" else constant(0.0)
+    if node.image.source == "TILED":
+        raise Unsupported(node, "its image is tiled (UDIM)")
     if node.projection != "FLAT":
         raise Unsupported(node, f"its projection is {node.projection.title()}")
     mapping = replace(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from .. import exr
+from ..baking import BakeError
 from ..notices import Notices
 from .images import Unreadable, linear_pixels
 from .nodes import Place, Unsupported, active_output, has_nodes, resolve
@@ -46,8 +48,15 @@ class World:
         return ["--environment", path, "--environment-rotation", f"{turn:.9g}"]
 
 
-def world_of(world: bpy.types.World | None, notices: Notices) -> World:
-    """The world of a scene; black without one. What cannot be said is noticed."""
+Bake = Callable[[bpy.types.World], np.ndarray]
+"""Renders a world to an equirectangular map, or raises `BakeError`."""
+
+
+def world_of(world: bpy.types.World | None, bake: Bake | None, notices: Notices) -> World:
+    """The world of a scene; black without one.
+
+    Nodes that cannot be said are baked by `bake`, or left out with a notice without it.
+    """
     if world is None:
         return World()
     group = world.lightgroup
@@ -56,10 +65,20 @@ def world_of(world: bpy.types.World | None, notices: Notices) -> World:
     try:
         found = _of_nodes(world.node_tree)
     except (Unsupported, Unreadable) as reason:
-        notices.add(f"the world's light is left out ({reason}); give it a colour or an equirectangular Environment Texture", world.name)
-        return World()
+        found = _baked(world, bake, reason, notices)
     found.light_group = group
     return found
+
+
+def _baked(world: bpy.types.World, bake: Bake | None, reason: Exception, notices: Notices) -> World:
+    remedy = "tick Bake World Nodes in the render settings"
+    if bake is not None:
+        try:
+            return World((1.0, 1.0, 1.0), np.maximum(bake(world), 0))
+        except BakeError as error:
+            reason, remedy = error, "give it a colour or an equirectangular Environment Texture"
+    notices.add(f"the world's light is left out ({reason}); {remedy}", world.name)
+    return World()
 
 
 def _of_nodes(tree: bpy.types.NodeTree) -> World:
