@@ -36,7 +36,7 @@ class MaterialExporter:
         name = material.name if material else "Default"
         writer = MaterialWriter(self._glb, self._images, name, self._notices)
         surface = self._surface(material, name)
-        self.energy_compensation |= surface.has_multiscatter
+        self.energy_compensation |= surface.has_multiscatter and surface.is_glossy
         item = writer.write(surface)
         item["doubleSided"] = not (material and material.use_backface_culling)
         use = writer.use

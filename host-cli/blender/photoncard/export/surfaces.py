@@ -47,6 +47,11 @@ class Surface:
     """True for glass that bends no light."""
     has_multiscatter: bool = False
 
+    @property
+    def is_glossy(self) -> bool:
+        """True if anything but a Lambertian base reflects."""
+        return any(value.texels.any() for value in (self.metallic, self.specular, self.coat, self.transmission))
+
 
 _EMPTY = Surface(alpha=constant(0.0))
 
