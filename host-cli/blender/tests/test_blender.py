@@ -286,6 +286,57 @@ class Nodes(unittest.TestCase):
         return texels[rows, columns].reshape(64, 4, 64, 4, 3).mean(axis=(1, 3))
 
 
+class Shaders(unittest.TestCase):
+    """Mean radiance of surfaces beside Cycles: a sphere and a floor under a lamp and a sky."""
+
+    def mixed(self, tree: bpy.types.NodeTree, kind: str, first: str, second: str, factor: object) -> bpy.types.Node:
+        node = tree.nodes.new(kind)
+        shaders = [tree.nodes.new(name) for name in (first, second)]
+        sockets = [socket for socket in node.inputs if socket.type == "SHADER"]
+        for shader, socket in zip(shaders, sockets):
+            if "Color" in shader.inputs:
+                shader.inputs["Color"].default_value = (0.7, 0.4, 0.2, 1)
+            if "Roughness" in shader.inputs and shader.bl_idname != "ShaderNodeBsdfDiffuse":
+                shader.inputs["Roughness"].default_value = 0.3
+            tree.links.new(shader.outputs[0], socket)
+        if isinstance(factor, str):
+            tree.links.new(tree.nodes.new(factor).outputs[0], node.inputs[0])
+        elif factor is not None:
+            node.inputs[0].default_value = factor
+        return node
+
+    CASES = (
+        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfAnisotropic", 0.4, 0.06),
+        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfAnisotropic", "ShaderNodeFresnel", 0.06),
+        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", 0.5, 0.06),
+        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", 0.3, 0.06),
+        ("ShaderNodeAddShader", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", None, 0.06),
+        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfDiffuse", 0.5, 0.06),
+        ("ShaderNodeMixShader", "ShaderNodeBsdfGlass", "ShaderNodeBsdfTransparent", "ShaderNodeLightPath", 0.1),
+    )
+
+    def test_mixed_shaders_have_the_radiance_of_cycles(self) -> None:
+        for kind, first, second, factor, tolerance in self.CASES:
+            with self.subTest(kind=kind, first=first, second=second, factor=factor):
+                scene = draft(scenes.clear())
+                made = bpy.data.materials.new("mixed")
+                scenes.use_nodes(made)
+                tree = made.node_tree
+                node = self.mixed(tree, kind, first, second, factor)
+                tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+                scenes.sphere("ball", (0, 0, 0.5), 0.5, made)
+                scenes.quad("floor", [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], scenes.matte("floor", (0.5, 0.5, 0.5)))
+                scenes.lamp("lamp", "AREA", (1, -1, 3), (0.4, 0.3, 0), energy=60, size=1)
+                scenes.world_input(scene, "Color").default_value = (0.3, 0.35, 0.4, 1)
+                scenes.camera((0, -3, 1.2), (0, 0, 0.4), lens=50)
+                with tempfile.TemporaryDirectory() as folder:
+                    ours, theirs = (rendering.colour(rendering.passes(scene, engine, Path(folder)))
+                                    for engine in ("PHOTONCARD", "CYCLES"))
+                # The ball fills the middle of the picture.
+                ours, theirs = (each[25:75, 55:105].mean(axis=(0, 1)) for each in (ours, theirs))
+                np.testing.assert_allclose(ours, theirs, rtol=tolerance)
+
+
 class Scenes(unittest.TestCase):
     """What is exported, and renders of parts and frames."""
 

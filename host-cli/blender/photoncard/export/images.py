@@ -19,20 +19,26 @@ class Unreadable(Exception):
     """An image without pixels."""
 
 
+def check_readable(image: bpy.types.Image) -> None:
+    """Raises `Unreadable` for an image without pixels."""
+    if 0 in image.size or not image.has_data and not len(image.pixels):
+        raise Unreadable(f"the image {image.name} cannot be read: {image.filepath or 'it has no file'}")
+
+
 def linear_pixels(image: bpy.types.Image) -> np.ndarray:
     """Pixels as float32 of the shape (height, width, 4), the bottom line first.
 
     Raises `Unreadable`.
     """
+    check_readable(image)
     width, height = image.size
-    if width == 0 or height == 0 or not image.has_data and not len(image.pixels):
-        raise Unreadable(f"the image {image.name} cannot be read: {image.filepath or 'it has no file'}")
     pixels = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, 4)
     # Pixels of float images are linear, those of byte images as in the file.
     if not image.is_float and not is_linear(image):
-        pixels[:, :, :3] = srgb_to_linear(pixels[:, :, :3])
+        levels = np.rint(pixels[:, :, :3] * 255).astype(np.uint8)
+        pixels[:, :, :3] = _SRGB_LEVELS[levels]
     return pixels
 
 
@@ -44,6 +50,9 @@ def is_linear(image: bpy.types.Image) -> bool:
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
     """Decodes sRGB."""
     return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0) + 0.055) / 1.055) ** 2.4)
+
+
+_SRGB_LEVELS = srgb_to_linear(np.arange(256, dtype=np.float32) / 255).astype(np.float32)
 
 
 def linear_to_srgb(values: np.ndarray) -> np.ndarray:

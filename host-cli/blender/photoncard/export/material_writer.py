@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import bpy
 import numpy as np
 
 from ..glb import Glb
@@ -84,7 +85,7 @@ class MaterialWriter:
             white = np.ones((*opacity.shape[:2], 3), np.float32)
             return factor, self._texture(np.concatenate([white, opacity[..., :1]], axis=2), True, alpha)
         if alpha.mapping is None:
-            return [1.0, 1.0, 1.0, _clamped([alpha.number])[0]], self._colour_texture(base)
+            return [1.0, 1.0, 1.0, _clamped([alpha.number])[0]], self._image(base, True)
         pixels = np.concatenate([colour[..., :3], opacity[..., :1]], axis=2)
         return [1.0] * 4, self._file(base, pixels, True) or self._texture(pixels, True, base)
 
@@ -119,9 +120,7 @@ class MaterialWriter:
             extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": brightest}
 
     def _normal_map(self, normal: NormalMap) -> Json:
-        pixels = normal.value.texels[..., :3]
-        texture = self._file(normal.value, pixels, False) or self._texture(pixels, False, normal.value)
-        return {**texture, "scale": normal.strength}
+        return {**self._image(normal.value, False), "scale": normal.strength}
 
     def _dielectric(self, surface: Surface, extensions: Json) -> None:
         """Index of refraction, specular and transmission."""
@@ -176,11 +175,16 @@ class MaterialWriter:
         scaled = value.map(lambda texels: texels / scale)
         if scaled.mapping is None:
             return _clamped(scaled.texels[:3]), None
-        return [1.0] * 3, self._colour_texture(scaled)
+        return [1.0] * 3, self._image(scaled, True)
 
-    def _colour_texture(self, value: Value) -> Json:
+    def _image(self, value: Value, is_colour: bool) -> Json:
+        """Texture of a value's three channels, of the image's file if that has them."""
+        if value.is_plain and value.image and _is_encoded_as(value.image, is_colour):
+            index = self._images.add_file(value.image)
+            if index is not None:
+                return self._info(index, value.mapping)
         pixels = value.texels[..., :3]
-        return self._file(value, pixels, True) or self._texture(pixels, True, value)
+        return self._file(value, pixels, is_colour) or self._texture(pixels, is_colour, value)
 
     def _of_one_mapping(self, first: Value, second: Value) -> tuple[Value, Value]:
         """Two values of one texture: the second becomes its mean if its mapping differs."""
@@ -201,7 +205,7 @@ class MaterialWriter:
     ) -> Json | None:
         """The file of the image that has these pixels in `channels`, by default in all of them."""
         image = value.image
-        if image is None or image.is_float or is_linear(image) == is_colour:
+        if image is None or not _is_encoded_as(image, is_colour):
             return None
         own = linear_pixels(image)
         if own.shape[:2] != pixels.shape[:2]:
@@ -251,6 +255,11 @@ class MaterialWriter:
     def _once(self, kind: str, item: Json) -> int:
         known = self._glb.root.get(kind, [])
         return known.index(item) if item in known else self._glb.add(kind, item)
+
+
+def _is_encoded_as(image: bpy.types.Image, is_colour: bool) -> bool:
+    """True if an image's file has the encoding that glTF gives colours, sRGB, or data."""
+    return not image.is_float and is_linear(image) != is_colour
 
 
 def _clamped(values: Any) -> list[float]:

@@ -165,6 +165,8 @@ class SurfaceReader:
             return None
 
     def _diffuse(self, end: Place) -> Surface:
+        if end.socket.node.bl_idname == "ShaderNodeBsdfDiffuse" and self._is_stated(end, "Roughness", 0.0):
+            self._note("the roughness of diffuse reflection is not rendered")
         return Surface(base=self._value(end, "Color"), normal=self._normal(input_of(end, "Normal")))
 
     def _subsurface(self, end: Place) -> Surface:
@@ -320,7 +322,7 @@ _LOST = (
     ("Subsurface Weight", 0.0, "subsurface scattering"),
     ("Anisotropic", 0.0, "anisotropy"),
     ("Thin Film Thickness", 0.0, "thin film"),
-    ("Diffuse Roughness", 0.0, "diffuse roughness"),
+    ("Diffuse Roughness", 0.0, "the diffuse roughness"),
 )
 
 _SHADERS: dict[str, Callable[[SurfaceReader, Place], Surface]] = {

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
 
-from .images import linear_pixels
+from .images import check_readable, linear_pixels
 from .nodes import Place, Unsupported, input_of, resolve
 
 
@@ -29,13 +30,23 @@ class Mapping:
 class Value:
     """A colour with alpha, or a number in all four: linear."""
 
-    texels: np.ndarray
-    """Of the shape (4,), or (height, width, 4) with the bottom line first."""
+    stated: np.ndarray | None
+    """Texels; `None` for those of the image, unchanged."""
     mapping: Mapping | None = None
     image: bpy.types.Image | None = None
     """The one image that the texels are computed from."""
     colours: str | None = None
     """Colour attribute that is a factor of the value."""
+
+    @cached_property
+    def texels(self) -> np.ndarray:
+        """Of the shape (4,), or (height, width, 4) with the bottom line first."""
+        return linear_pixels(self.image) if self.stated is None else self.stated
+
+    @property
+    def is_plain(self) -> bool:
+        """True for an image's colours as they are."""
+        return self.stated is None
 
     @property
     def is_constant(self) -> bool:
@@ -55,7 +66,7 @@ class Value:
 
     def map(self, function: Callable[[np.ndarray], np.ndarray]) -> Value:
         """The value of a function of the texels."""
-        return replace(self, texels=function(self.texels))
+        return replace(self, stated=function(self.texels))
 
 
 def constant(value: object) -> Value:
@@ -171,10 +182,9 @@ def _image(end: Place) -> Value:
         wrap=node.extension,
         is_nearest=node.interpolation == "Closest",
     )
-    texels = linear_pixels(node.image)
-    if end.socket.name == "Alpha":
-        return Value(_grey(texels[..., 3]), mapping, node.image)
-    return Value(texels, mapping, node.image)
+    check_readable(node.image)
+    colour = Value(None, mapping, node.image)
+    return colour.map(lambda texels: _grey(texels[..., 3])) if end.socket.name == "Alpha" else colour
 
 
 def _mapping(vector: Place) -> Mapping:
