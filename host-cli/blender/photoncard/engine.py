@@ -40,8 +40,15 @@ class PhotoncardEngine(bpy.types.RenderEngine):
         try:
             _Picture(self, depsgraph).render()
         except (CameraError, TooLarge, command.CommandError, exr.ExrError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            self.error_set(str(error))
+            self._fail(str(error))
+        except Exception as error:
+            # Blender shows no errors of Python, and would show an empty picture.
+            self._fail(f"The extension failed ({type(error).__name__}: {error}); the console has the details.")
+            raise
+
+    def _fail(self, message: str) -> None:
+        self.report({"ERROR"}, message)
+        self.error_set(message)
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         """States the passes of a view layer."""

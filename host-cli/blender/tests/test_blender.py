@@ -389,6 +389,13 @@ class Scenes(unittest.TestCase):
         self.assertEqual(triangles("house"), [10, 2])
         self.assertIs(nodes["ground"]["extras"]["photoncard"]["camera"], False)
 
+    def test_objects_beyond_the_clipping_are_named(self) -> None:
+        scene = scenes.plan()
+        self.assertNotIn("clipping", " ".join(self.exported(scene).notices.lines()))
+        scene.camera.data.clip_start, scene.camera.data.clip_end = 7.5, 100
+        lines = [line for line in self.exported(scene).notices.lines() if "clipping" in line]
+        self.assertEqual(lines, ["objects are rendered beyond the camera's clipping too: house, other"])
+
     def test_metalness_and_roughness_are_packed_into_one_image(self) -> None:
         scene = scenes.plan()
         made = scenes.material("packed", (1, 1, 1))

@@ -24,6 +24,9 @@ def add_light(
 ) -> None:
     """Adds a light object; `extras` are those of its node."""
     light = ob.data
+    if light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False):
+        # A portal guides the samples of Cycles, and gives no light.
+        return
     colour = _colour(light, notices)
     if light.energy == 0 or colour is None or max(colour) == 0:
         return

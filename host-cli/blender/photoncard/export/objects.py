@@ -12,6 +12,7 @@ from ..glb import Glb
 from ..notices import Notices
 from .axes import node_matrix
 from .camera import Frame, add_camera
+from .clipping import Clipping
 from .lights import add_light
 from .materials import MaterialExporter
 from .meshes import MeshExporter
@@ -58,6 +59,7 @@ def export(
             exporter.add(instance)
     scene = depsgraph.scene
     evaluated = camera.evaluated_get(depsgraph) if camera else None
+    exporter.clipping.notice(evaluated, exporter.notices)
     add_camera(exporter.glb, evaluated, scene.render, frame, exporter.notices)
     if scene.render.use_motion_blur:
         exporter.notices.add("motion blur is not rendered")
@@ -79,6 +81,7 @@ class _Exporter:
         self.materials = MaterialExporter(self.glb, self.notices, layer.material_override)
         self.light_groups = {group.name for group in layer.lightgroups}
         self._layer = layer
+        self.clipping = Clipping()
         self._meshes = MeshExporter(self.glb, self.materials, self.notices)
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
@@ -101,7 +104,9 @@ class _Exporter:
         if matrix is None:
             self.notices.add("objects without a finite transform are not rendered", ob.name)
             return
-        if not is_seen:
+        if is_seen:
+            self.clipping.add(ob, instance.matrix_world)
+        else:
             extras["camera"] = False
         node: dict[str, Any] = {"name": ob.name, "mesh": mesh, "matrix": matrix}
         if extras:
