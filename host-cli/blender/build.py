@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Makes the zip of the Blender extension: `build.py BINARY OUT_DIR`.
 
-The zip has the program BINARY as `bin/photoncard`, for the platform that the program's header states. Equal inputs
-make equal bytes. Where the command `blender` is found, it validates the zip.
+The zip has the program BINARY as `bin/photoncard`, for the platform that the program's header states.
+Equal inputs make equal bytes. Where the command `blender` is found, it validates the zip.
 """
 
 from __future__ import annotations

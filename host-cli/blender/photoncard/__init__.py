@@ -3,9 +3,9 @@
 
 def register() -> None:
     """Registers the engine, its settings and its panels."""
-    from . import engine, panels, properties
-
     import bpy
+
+    from . import engine, panels, properties
 
     properties.register()
     bpy.utils.register_class(engine.PhotoncardEngine)
@@ -14,9 +14,9 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregisters them."""
-    from . import engine, panels, properties
-
     import bpy
+
+    from . import engine, panels, properties
 
     panels.unregister()
     bpy.utils.unregister_class(engine.PhotoncardEngine)

@@ -1,4 +1,7 @@
-"""Renders a world as an equirectangular map: `bake_world.py LIBRARY WORLD OUTPUT` in Blender without a window."""
+"""Renders a world as an equirectangular map, in Blender without a window.
+
+Arguments: the library, the name of its world, and the file to write.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,11 @@ def _set_up(scene: bpy.types.Scene, output: str) -> None:
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_depth = "32"
     render.image_settings.exr_codec = "ZIP"
-    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = _SAMPLES, False, False
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = (
+        _SAMPLES,
+        False,
+        False,
+    )
     scene.cycles.sample_clamp_direct = scene.cycles.sample_clamp_indirect = 0
     scene.cycles.pixel_filter_type = "BOX"
 

@@ -42,7 +42,7 @@ def bake_world(world: bpy.types.World) -> np.ndarray:
 def _run(arguments: list[str]) -> None:
     # The package bpy of Python has no program of its own.
     program = [sys.executable, _SCRIPT]
-    if not bpy.app.module:
+    if bpy.app.binary_path and not getattr(bpy.app, "module", False):
         options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", _SCRIPT, "--"]
         program = [bpy.app.binary_path, *options]
     done = subprocess.run(

@@ -20,7 +20,9 @@ from .packets import PacketError, PacketReader, Tile
 NAME = "photoncard.exe" if sys.platform == "win32" else "photoncard"
 _PATIENCE = 5.0
 """Seconds from the request to stop until the process is ended."""
-_REMEDY = "Install the extension's zip for this platform, or state the program in the extension's preferences."
+_REMEDY = (
+    "Install the extension's zip for this platform, or state the program in the extension's preferences."
+)
 
 
 class CommandError(Exception):
@@ -34,7 +36,9 @@ def find(stated: str, folder: str) -> str:
     """
     if stated:
         if not os.path.isfile(stated):
-            raise CommandError(f"There is no program {stated}: correct the path in the extension's preferences.")
+            raise CommandError(
+                f"There is no program {stated}: correct the path in the extension's preferences."
+            )
         return stated
     bundled = os.path.join(folder, "bin", NAME)
     if os.path.isfile(bundled):

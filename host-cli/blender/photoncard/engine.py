@@ -11,18 +11,24 @@ import numpy as np
 
 from . import command, events, exr
 from .baking import bake_world
-from .export.camera import CameraError, Frame, frame_of
+from .export.camera import CameraError, frame_of
 from .export.objects import Exported, export
 from .glb import TooLarge
 from .packets import Tile
-from .passes import Pass, matte_fields, passes_of
+from .passes import matte_fields, passes_of
 from .properties import program_stated
 
 IDENTIFIER = "PHOTONCARD"
 
 _INTERVAL = 0.1
 """Seconds between looks at what the user wants."""
-_PHASES = {"pilot": (0.0, 0.1), "photons": (0.1, 0.2), "pack": (0.2, 0.23), "load": (0.23, 0.25), "tiles": (0.25, 1.0)}
+_PHASES = {
+    "pilot": (0.0, 0.1),
+    "photons": (0.1, 0.2),
+    "pack": (0.2, 0.23),
+    "load": (0.23, 0.25),
+    "tiles": (0.25, 1.0),
+}
 """Shares of the whole at which phases begin and end."""
 
 
@@ -43,7 +49,9 @@ class PhotoncardEngine(bpy.types.RenderEngine):
             self._fail(str(error))
         except Exception as error:
             # Blender shows no errors of Python, and would show an empty picture.
-            self._fail(f"The extension failed ({type(error).__name__}: {error}); the console has the details.")
+            self._fail(
+                f"The extension failed ({type(error).__name__}: {error}); the console has the details."
+            )
             raise
 
     def _fail(self, message: str) -> None:
@@ -53,7 +61,9 @@ class PhotoncardEngine(bpy.types.RenderEngine):
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         """States the passes of a view layer."""
         for stated in passes_of(renderlayer, scene.photoncard.use_denoising):
-            self.register_pass(scene, renderlayer, stated.name, len(stated.channels), stated.channels, stated.kind)
+            self.register_pass(
+                scene, renderlayer, stated.name, len(stated.channels), stated.channels, stated.kind
+            )
 
 
 class _Picture:
@@ -78,7 +88,9 @@ class _Picture:
         program = command.find(program_stated(), os.path.dirname(__file__))
         engine.update_stats("", "Exporting the scene")
         camera = engine.camera_override or self._scene.camera
-        exported = export(self._depsgraph, camera, self._frame, bake_world if self._scene.photoncard.use_bake else None)
+        exported = export(
+            self._depsgraph, camera, self._frame, bake_world if self._scene.photoncard.use_bake else None
+        )
         for line in exported.notices.lines():
             engine.report({"WARNING"}, line)
         with tempfile.TemporaryDirectory(prefix="photoncard-", dir=bpy.app.tempdir) as folder:

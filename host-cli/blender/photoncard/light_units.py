@@ -38,9 +38,9 @@ def ellipse_or_rectangle(width: float, height: float, is_ellipse: bool) -> float
 def spot_cones(size: float, blend: float) -> tuple[float, float]:
     """Inner and outer cone angles of glTF, radians, of a spot light of the full angle `size`.
 
-    Cycles' falloff is a smooth step of the cosine from 0 at `cos outer` to 1 at `cos outer + w`, where `w =
-    blend (1 - cos outer)`: it loses the flux of `w / 2`. glTF's squared ramp of the width `v` loses `2 v / 3`.
-    The inner cone has `v = 3 w / 4`, for equal flux.
+    Cycles' falloff is a smooth step of the cosine from 0 at `cos outer` to 1 at `cos outer + w`, where
+    `w = blend (1 - cos outer)`: it loses the flux of `w / 2`. glTF's squared ramp of the width `v` loses
+    `2 v / 3`. The inner cone has `v = 3 w / 4`, for equal flux.
     """
     outer = min(size / 2, WIDEST_SPOT)
     edge = math.cos(outer)

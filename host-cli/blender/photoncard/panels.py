@@ -158,7 +158,9 @@ class PHOTONCARD_PT_object(_Panel, bpy.types.Panel):
         """Shows the settings."""
         layout = self._split()
         layout.prop(context.object, "visible_camera", text="Visible to Camera")
-        layout.prop_search(context.object, "lightgroup", context.view_layer, "lightgroups", text="Light Group")
+        layout.prop_search(
+            context.object, "lightgroup", context.view_layer, "lightgroups", text="Light Group"
+        )
 
 
 class PHOTONCARD_PT_world(_Panel, bpy.types.Panel):

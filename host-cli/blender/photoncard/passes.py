@@ -59,7 +59,9 @@ def passes_of(view_layer: Any, is_denoised: bool) -> list[Pass]:
         passes += _matte("CryptoObject", "object", levels)
     if view_layer.use_pass_cryptomatte_material:
         passes += _matte("CryptoMaterial", "material", levels)
-    passes += [_colour(f"Combined_{group.name}", f"light_{group.name}.", None) for group in view_layer.lightgroups]
+    passes += [
+        _colour(f"Combined_{group.name}", f"light_{group.name}.", None) for group in view_layer.lightgroups
+    ]
     return passes
 
 

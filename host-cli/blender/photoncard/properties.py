@@ -27,7 +27,11 @@ _LIMITS = (
 )
 _CAUSTICS = (
     ("AUTO", "Automatic", "As many photons as the quality needs, if the scene focuses light"),
-    ("OFF", "Off", "No caustic map: light that glass and mirrors focus is noisy, that of lamps without size is lost"),
+    (
+        "OFF",
+        "Off",
+        "No caustic map: focused light is noisy, and that of lamps without size is lost",
+    ),
     ("PHOTONS", "Photons", "A stated number of photons"),
 )
 
@@ -37,7 +41,7 @@ class Card(bpy.types.PropertyGroup):
 
     address: StringProperty(
         name="Address",
-        description="emulated[:CHIPS], tcp:HOST:PORT, unix:PATH or serial:PATH, as photoncard's --card takes it",
+        description="Address as of --card: emulated[:CHIPS], tcp:HOST:PORT, unix:PATH or serial:PATH",
         default="emulated",
     )
 
@@ -89,10 +93,16 @@ class SceneSettings(bpy.types.PropertyGroup):
 class ViewLayerSettings(bpy.types.PropertyGroup):
     """Passes of a view layer that Blender has no property for."""
 
-    use_pass_direct: BoolProperty(name="Direct", description="Emission, and light of lamps and the world that arrives directly")
+    use_pass_direct: BoolProperty(
+        name="Direct", description="Emission, and light of lamps and the world that arrives directly"
+    )
     use_pass_indirect: BoolProperty(name="Indirect", description="Light that surfaces have reflected before")
-    use_pass_caustics: BoolProperty(name="Caustics", description="Light that mirrors, glass and glossy surfaces focus")
-    use_pass_albedo: BoolProperty(name="Denoising Albedo", description="Albedo of the visible surfaces, 0 to 1")
+    use_pass_caustics: BoolProperty(
+        name="Caustics", description="Light that mirrors, glass and glossy surfaces focus"
+    )
+    use_pass_albedo: BoolProperty(
+        name="Denoising Albedo", description="Albedo of the visible surfaces, 0 to 1"
+    )
 
 
 class Preferences(bpy.types.AddonPreferences):

@@ -28,7 +28,9 @@ def passes(scene: bpy.types.Scene, engine: str, folder: Path) -> dict[str, np.nd
     settings.exr_codec = "ZIP"
     bpy.data.images["Render Result"].save_render(str(path), scene=scene)
     channels = exr.read(path).channels
-    return {name.partition(".")[2] if name.count(".") > 1 else name: values for name, values in channels.items()}
+    return {
+        name.partition(".")[2] if name.count(".") > 1 else name: values for name, values in channels.items()
+    }
 
 
 def colour(channels: dict[str, np.ndarray], name: str = "Combined") -> np.ndarray:
@@ -51,5 +53,9 @@ def save_png(path: Path, *pictures: np.ndarray) -> None:
 
     joined = np.concatenate(pictures, axis=1)
     exposed = joined * (0.5 / max(float(np.median(pictures[-1][pictures[-1] > 0])), 1e-6) * 0.4)
-    encoded = np.clip(np.where(exposed <= 0.0031308, exposed * 12.92, 1.055 * np.maximum(exposed, 0) ** (1 / 2.4) - 0.055), 0, 1)
+    encoded = np.clip(
+        np.where(exposed <= 0.0031308, exposed * 12.92, 1.055 * np.maximum(exposed, 0) ** (1 / 2.4) - 0.055),
+        0,
+        1,
+    )
     path.write_bytes(png.encode(np.rint(encoded * 255).astype(np.uint8)))

@@ -13,8 +13,16 @@ WIDTH, HEIGHT = 160, 90
 
 def clear() -> bpy.types.Scene:
     """An empty scene with the test's size."""
-    for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.lights,
-                       bpy.data.cameras, bpy.data.images, bpy.data.worlds, bpy.data.curves):
+    for collection in (
+        bpy.data.objects,
+        bpy.data.meshes,
+        bpy.data.materials,
+        bpy.data.lights,
+        bpy.data.cameras,
+        bpy.data.images,
+        bpy.data.worlds,
+        bpy.data.curves,
+    ):
         for item in list(collection):
             collection.remove(item)
     scene = bpy.context.scene
@@ -25,7 +33,7 @@ def clear() -> bpy.types.Scene:
     scene.render.resolution_percentage = 100
     scene.render.film_transparent = False
     scene.render.use_border = False
-    for group in list(bpy.context.view_layer.lightgroups):
+    for _ in list(bpy.context.view_layer.lightgroups):
         bpy.ops.scene.view_layer_remove_lightgroup()
     return scene
 
@@ -66,7 +74,9 @@ def mesh(name: str, vertices: list, faces: list, *materials: bpy.types.Material)
     return placed(name, data)
 
 
-def placed(name: str, data: bpy.types.ID, location: tuple = (0, 0, 0), turn: tuple = (0, 0, 0)) -> bpy.types.Object:
+def placed(
+    name: str, data: bpy.types.ID, location: tuple = (0, 0, 0), turn: tuple = (0, 0, 0)
+) -> bpy.types.Object:
     """An object of some data."""
     ob = bpy.data.objects.new(name, data)
     ob.location, ob.rotation_euler = location, turn
@@ -102,7 +112,11 @@ def sphere(name: str, centre: tuple, radius: float, made: bpy.types.Material) ->
     points.append((0, 0, radius))
     at = lambda row, column: 1 + (row - 1) * across + column % across  # noqa: E731
     faces = [(0, at(1, c + 1), at(1, c)) for c in range(across)]
-    faces += [(at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)) for r in range(1, down - 1) for c in range(across)]
+    faces += [
+        (at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c))
+        for r in range(1, down - 1)
+        for c in range(across)
+    ]
     faces += [(len(points) - 1, at(down - 1, c), at(down - 1, c + 1)) for c in range(across)]
     ob = mesh(name, points, faces, made)
     ob.location = centre
@@ -110,7 +124,9 @@ def sphere(name: str, centre: tuple, radius: float, made: bpy.types.Material) ->
     return ob
 
 
-def lamp(name: str, kind: str, location: tuple, turn: tuple = (0, 0, 0), **properties: object) -> bpy.types.Object:
+def lamp(
+    name: str, kind: str, location: tuple, turn: tuple = (0, 0, 0), **properties: object
+) -> bpy.types.Object:
     """A light."""
     light = bpy.data.lights.new(name, kind)
     for key, value in properties.items():
@@ -183,14 +199,35 @@ def room() -> bpy.types.Scene:
     quad("back", [(-2, 2, 0), (2, 2, 0), (2, 2, 2.5), (-2, 2, 2.5)], white)
     quad("left", [(-2, -2, 0), (-2, 2, 0), (-2, 2, 2.5), (-2, -2, 2.5)], red)
     # The right wall has a window.
-    for index, (y0, y1, z0, z1) in enumerate(((-2, 2, 0, 0.9), (-2, 2, 2, 2.5), (-2, -0.5, 0.9, 2), (1, 2, 0.9, 2))):
+    for index, (y0, y1, z0, z1) in enumerate(
+        ((-2, 2, 0, 0.9), (-2, 2, 2, 2.5), (-2, -0.5, 0.9, 2), (1, 2, 0.9, 2))
+    ):
         quad(f"right{index}", [(2, y1, z0), (2, y0, z0), (2, y0, z1), (2, y1, z1)], white)
-    box("table", (-0.9, 0, 0), (0.5, 0.9, 0.7), material("wood", (0.35, 0.2, 0.1), Roughness=0.4, Coat_Weight=0.3))
-    sphere("glass", (-0.5, 0.4, 0.95), 0.25, material("glass", (1, 1, 1), Transmission_Weight=1.0, Roughness=0.0, IOR=1.45))
+    box(
+        "table",
+        (-0.9, 0, 0),
+        (0.5, 0.9, 0.7),
+        material("wood", (0.35, 0.2, 0.1), Roughness=0.4, Coat_Weight=0.3),
+    )
+    sphere(
+        "glass",
+        (-0.5, 0.4, 0.95),
+        0.25,
+        material("glass", (1, 1, 1), Transmission_Weight=1.0, Roughness=0.0, IOR=1.45),
+    )
     sphere("brass", (0.15, 0.4, 0.9), 0.2, material("brass", (0.9, 0.7, 0.3), Metallic=1.0, Roughness=0.25))
     lamp("sun", "SUN", (4, 0, 4), (0, math.radians(50), math.radians(10)), energy=6, angle=math.radians(2))
     lamp("panel", "AREA", (-0.5, 0.5, 2.4), (0, 0, 0), energy=40, size=0.6, color=(1, 0.8, 0.6))
-    lamp("disk", "AREA", (-1.8, -1, 1.5), (0, math.radians(-90), 0), energy=15, shape="ELLIPSE", size=0.3, size_y=0.6)
+    lamp(
+        "disk",
+        "AREA",
+        (-1.8, -1, 1.5),
+        (0, math.radians(-90), 0),
+        energy=15,
+        shape="ELLIPSE",
+        size=0.3,
+        size_y=0.6,
+    )
     environment(scene, 1.0, math.radians(120))
     camera((0.4, -1.9, 1.5), (-0.3, 1, 0.9), lens=18)
     return scene
@@ -203,8 +240,25 @@ def product() -> bpy.types.Scene:
     sphere("ball", (0, 0, 0.5), 0.5, plastic)
     box("plinth", (-0.8, -0.8, -0.2), (0.8, 0.8, 0), matte("stone", (0.5, 0.5, 0.5)))
     sphere("far", (1.4, 2.5, 0.4), 0.4, material("chrome", (0.9, 0.9, 0.9), Metallic=1.0, Roughness=0.1))
-    lamp("key", "AREA", (-2, -2, 2.5), (math.radians(55), 0, math.radians(-45)), energy=150, shape="RECTANGLE", size=1, size_y=1.5)
-    lamp("rim", "AREA", (2, 1.5, 2), (math.radians(-60), math.radians(20), math.radians(-40)), energy=80, size=0.8, color=(0.7, 0.8, 1))
+    lamp(
+        "key",
+        "AREA",
+        (-2, -2, 2.5),
+        (math.radians(55), 0, math.radians(-45)),
+        energy=150,
+        shape="RECTANGLE",
+        size=1,
+        size_y=1.5,
+    )
+    lamp(
+        "rim",
+        "AREA",
+        (2, 1.5, 2),
+        (math.radians(-60), math.radians(20), math.radians(-40)),
+        energy=80,
+        size=0.8,
+        color=(0.7, 0.8, 1),
+    )
     lamp("fill", "POINT", (2, -3, 1), energy=60, shadow_soft_size=0.2)
     world_input(scene, "Color").default_value = (0.1, 0.12, 0.15, 1)
     scene.render.film_transparent = True
@@ -228,7 +282,15 @@ def plan() -> bpy.types.Scene:
     label.materials.append(matte("ink", (0.05, 0.05, 0.05)))
     placed("label", label, (-2.5, 0.5, 0.06))
     lamp("sun", "SUN", (0, 0, 5), (math.radians(35), math.radians(20), 0), energy=3, angle=math.radians(0.5))
-    lamp("spot", "SPOT", (-1.5, -1.2, 3), energy=300, spot_size=math.radians(50), spot_blend=0.4, shadow_soft_size=0.0)
+    lamp(
+        "spot",
+        "SPOT",
+        (-1.5, -1.2, 3),
+        energy=300,
+        spot_size=math.radians(50),
+        spot_blend=0.4,
+        shadow_soft_size=0.0,
+    )
     world_input(scene, "Color").default_value = (0.2, 0.25, 0.3, 1)
     camera((0.3, -0.2, 8), (0.3, -0.2, 0), type="ORTHO", ortho_scale=7, shift_x=0.05)
     return scene

@@ -1,7 +1,7 @@
 """Tests in Blender: `python -m unittest test_blender` with the package bpy, and the zip in PHOTONCARD_ZIP.
 
-The zip is installed as a user installs it. Radiance is compared with that of Cycles. PHOTONCARD_PICTURES names a folder
-for pictures of both side by side.
+The zip is installed as a user installs it. Radiance is compared with that of Cycles. PHOTONCARD_PICTURES
+names a folder for pictures of both side by side.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ class Pictures(unittest.TestCase):
             theirs = rendering.passes(scene, "CYCLES", Path(folder))
         pictures = os.environ.get("PHOTONCARD_PICTURES")
         if pictures:
-            rendering.save_png(Path(pictures) / f"{name}.png", rendering.colour(ours), rendering.colour(theirs))
+            rendering.save_png(
+                Path(pictures) / f"{name}.png", rendering.colour(ours), rendering.colour(theirs)
+            )
         mean, expected = (rendering.colour(each).mean(axis=(0, 1)) for each in (ours, theirs))
         print(f"{name}: {mean} beside {expected} of Cycles", file=sys.stderr)
         np.testing.assert_allclose(mean, expected, rtol=TOLERANCE)
@@ -77,8 +79,13 @@ class Passes(unittest.TestCase):
     def test_all_passes_are_there_with_their_values(self) -> None:
         scene = draft(scenes.plan())
         layer = bpy.context.view_layer
-        named = ("use_pass_z", "use_pass_normal", "use_pass_position", "use_pass_cryptomatte_object",
-                 "use_pass_cryptomatte_material")
+        named = (
+            "use_pass_z",
+            "use_pass_normal",
+            "use_pass_position",
+            "use_pass_cryptomatte_object",
+            "use_pass_cryptomatte_material",
+        )
         own = ("use_pass_direct", "use_pass_indirect", "use_pass_caustics", "use_pass_albedo")
         for owner, names in ((layer, named), (layer.photoncard, own)):
             for name in names:
@@ -101,8 +108,12 @@ class Passes(unittest.TestCase):
         self.assertTrue((groups[0] + groups[1] <= combined + 1e-4).all())
         # The ground is 8 m below the camera, and faces it.
         corner = (scenes.HEIGHT - 3, 3)
-        self.assertAlmostEqual(float(channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"][corner]), 8, delta=0.01)
-        np.testing.assert_allclose([channels[f"Normal.{axis}"][corner] for axis in "XYZ"], (0, 0, 1), atol=1e-3)
+        self.assertAlmostEqual(
+            float(channels["Depth.Z" if "Depth.Z" in channels else "Depth.V"][corner]), 8, delta=0.01
+        )
+        np.testing.assert_allclose(
+            [channels[f"Normal.{axis}"][corner] for axis in "XYZ"], (0, 0, 1), atol=1e-3
+        )
         # The picture is 7 m wide, its middle at 0.3 m plus a shift of 0.35 m.
         across = 0.3 + 0.35 + 7 * (3.5 / scenes.WIDTH - 0.5)
         self.assertAlmostEqual(float(channels["Position.X"][corner]), across, delta=0.03)
@@ -116,7 +127,11 @@ class Passes(unittest.TestCase):
 class World(unittest.TestCase):
     def test_a_gradient_is_baked_and_as_bright_as_in_cycles(self) -> None:
         scene = draft(scenes.clear())
-        scenes.quad("ground", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], scenes.matte("ground", (0.5, 0.5, 0.5)))
+        scenes.quad(
+            "ground",
+            [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)],
+            scenes.matte("ground", (0.5, 0.5, 0.5)),
+        )
         scenes.box("wall", (-2, 1, 0), (2, 1.2, 1.5), scenes.matte("wall", (0.7, 0.7, 0.7)))
         scenes.camera((1, -5, 2), (0, 0, 1), lens=24)
         tree = scene.world.node_tree
@@ -136,14 +151,18 @@ class World(unittest.TestCase):
             theirs = rendering.colour(rendering.passes(scene, "CYCLES", Path(folder)))
         # The directions of the world are those of Cycles, in the background too.
         np.testing.assert_allclose(ours[:8].mean(axis=0), theirs[:8].mean(axis=0), atol=0.02)
-        np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=TOLERANCE, atol=0.01)
+        np.testing.assert_allclose(
+            ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=TOLERANCE, atol=0.01
+        )
 
     def test_an_unsaid_world_is_named_without_baking(self) -> None:
         world = importlib.import_module(f"{MODULE}.export.world")
         notices = importlib.import_module(f"{MODULE}.notices").Notices()
         scene = scenes.clear()
         tree = scene.world.node_tree
-        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], tree.nodes["Background"].inputs["Color"])
+        tree.links.new(
+            tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], tree.nodes["Background"].inputs["Color"]
+        )
         self.assertFalse(world.world_of(scene.world, None, notices).is_lit)
         self.assertRegex(notices.lines()[0], "Noise Texture.*tick Bake World Nodes.*world")
 
@@ -174,7 +193,11 @@ class Brightness(unittest.TestCase):
                 continue
             with self.subTest(kind=kind, **properties):
                 scene = scenes.clear()
-                scenes.quad("floor", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], scenes.matte("floor", (0.5, 0.5, 0.5)))
+                scenes.quad(
+                    "floor",
+                    [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
+                    scenes.matte("floor", (0.5, 0.5, 0.5)),
+                )
                 scenes.lamp("lamp", kind, (0, 0, self.HEIGHT), **properties)
                 scenes.camera((0, 0, 2), (0, 0, 0), type="ORTHO", ortho_scale=0.05)
                 rendering.use_cycles(scene, 256)
@@ -216,7 +239,9 @@ class Nodes(unittest.TestCase):
         tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
         return node.outputs["Color"]
 
-    def chain(self, tree: bpy.types.NodeTree, kind: str, settings: dict, inputs: dict, out: int) -> bpy.types.NodeSocket:
+    def chain(
+        self, tree: bpy.types.NodeTree, kind: str, settings: dict, inputs: dict, out: int
+    ) -> bpy.types.NodeSocket:
         node = tree.nodes.new(kind)
         for name, value in settings.items():
             setattr(node, name, value)
@@ -243,8 +268,26 @@ class Nodes(unittest.TestCase):
         ("ShaderNodeMapRange", {}, {0: "board", 1: 0.2, 2: 0.6, 3: 0.1, 4: 0.9}, 0),
         ("ShaderNodeClamp", {}, {0: "board", 1: 0.3, 2: 0.5}, 0),
         ("ShaderNodeRGBCurve", {}, {0: 0.8, 1: "board"}, 0),
-        *(("ShaderNodeMix", {"data_type": "RGBA", "blend_type": mode}, {0: 0.6, 1: "board", 2: (0.5, 0.3, 0.7, 1)}, 0)
-          for mode in ("MIX", "ADD", "MULTIPLY", "SUBTRACT", "SCREEN", "DIFFERENCE", "DIVIDE", "OVERLAY", "DARKEN", "LIGHTEN")),
+        *(
+            (
+                "ShaderNodeMix",
+                {"data_type": "RGBA", "blend_type": mode},
+                {0: 0.6, 1: "board", 2: (0.5, 0.3, 0.7, 1)},
+                0,
+            )
+            for mode in (
+                "MIX",
+                "ADD",
+                "MULTIPLY",
+                "SUBTRACT",
+                "SCREEN",
+                "DIFFERENCE",
+                "DIVIDE",
+                "OVERLAY",
+                "DARKEN",
+                "LIGHTEN",
+            )
+        ),
         ("ShaderNodeMix", {"data_type": "FLOAT"}, {0: "board", 1: 0.2, 2: 0.9}, 0),
     )
 
@@ -271,7 +314,9 @@ class Nodes(unittest.TestCase):
                 # Blocks of pixels: those at the edges of texels have but four samples of Cycles.
                 means = [each.reshape(8, 8, 8, 8, 3).mean(axis=(1, 3)) for each in (seen, self.shown(value))]
                 np.testing.assert_allclose(*means, atol=0.04 * max(seen.max(), 1))
-                np.testing.assert_allclose(seen.mean(axis=(0, 1)), self.shown(value).mean(axis=(0, 1)), atol=0.006)
+                np.testing.assert_allclose(
+                    seen.mean(axis=(0, 1)), self.shown(value).mean(axis=(0, 1)), atol=0.006
+                )
 
     def shown(self, value: object) -> np.ndarray:
         """The picture of a value on the quad, by glTF's transform of texture coordinates, the top line first."""
@@ -289,7 +334,9 @@ class Nodes(unittest.TestCase):
 class Shaders(unittest.TestCase):
     """Mean radiance of surfaces beside Cycles: a sphere and a floor under a lamp and a sky."""
 
-    def mixed(self, tree: bpy.types.NodeTree, kind: str, first: str, second: str, factor: object) -> bpy.types.Node:
+    def mixed(
+        self, tree: bpy.types.NodeTree, kind: str, first: str, second: str, factor: object
+    ) -> bpy.types.Node:
         node = tree.nodes.new(kind)
         shaders = [tree.nodes.new(name) for name in (first, second)]
         sockets = [socket for socket in node.inputs if socket.type == "SHADER"]
@@ -307,12 +354,24 @@ class Shaders(unittest.TestCase):
 
     CASES = (
         ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfAnisotropic", 0.4, 0.06),
-        ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfAnisotropic", "ShaderNodeFresnel", 0.06),
+        (
+            "ShaderNodeMixShader",
+            "ShaderNodeBsdfDiffuse",
+            "ShaderNodeBsdfAnisotropic",
+            "ShaderNodeFresnel",
+            0.06,
+        ),
         ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", 0.5, 0.06),
         ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", 0.3, 0.06),
         ("ShaderNodeAddShader", "ShaderNodeBsdfDiffuse", "ShaderNodeEmission", None, 0.06),
         ("ShaderNodeMixShader", "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfDiffuse", 0.5, 0.06),
-        ("ShaderNodeMixShader", "ShaderNodeBsdfGlass", "ShaderNodeBsdfTransparent", "ShaderNodeLightPath", 0.1),
+        (
+            "ShaderNodeMixShader",
+            "ShaderNodeBsdfGlass",
+            "ShaderNodeBsdfTransparent",
+            "ShaderNodeLightPath",
+            0.1,
+        ),
     )
 
     def test_mixed_shaders_have_the_radiance_of_cycles(self) -> None:
@@ -325,13 +384,19 @@ class Shaders(unittest.TestCase):
                 node = self.mixed(tree, kind, first, second, factor)
                 tree.links.new(node.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
                 scenes.sphere("ball", (0, 0, 0.5), 0.5, made)
-                scenes.quad("floor", [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)], scenes.matte("floor", (0.5, 0.5, 0.5)))
+                scenes.quad(
+                    "floor",
+                    [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)],
+                    scenes.matte("floor", (0.5, 0.5, 0.5)),
+                )
                 scenes.lamp("lamp", "AREA", (1, -1, 3), (0.4, 0.3, 0), energy=60, size=1)
                 scenes.world_input(scene, "Color").default_value = (0.3, 0.35, 0.4, 1)
                 scenes.camera((0, -3, 1.2), (0, 0, 0.4), lens=50)
                 with tempfile.TemporaryDirectory() as folder:
-                    ours, theirs = (rendering.colour(rendering.passes(scene, engine, Path(folder)))
-                                    for engine in ("PHOTONCARD", "CYCLES"))
+                    ours, theirs = (
+                        rendering.colour(rendering.passes(scene, engine, Path(folder)))
+                        for engine in ("PHOTONCARD", "CYCLES")
+                    )
                 # The ball fills the middle of the picture.
                 ours, theirs = (each[25:75, 55:105].mean(axis=(0, 1)) for each in (ours, theirs))
                 np.testing.assert_allclose(ours, theirs, rtol=tolerance)
@@ -422,7 +487,12 @@ class Scenes(unittest.TestCase):
             whole = rendering.colour(rendering.passes(scene, "PHOTONCARD", Path(folder)))
             render = scene.render
             render.use_border = render.use_crop_to_border = True
-            render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1
+            render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = (
+                0.25,
+                0.75,
+                0.5,
+                1,
+            )
             part = rendering.colour(rendering.passes(scene, "PHOTONCARD", Path(folder)))
         render.use_border = False
         self.assertEqual(part.shape, (45, 80, 3))

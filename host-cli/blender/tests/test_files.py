@@ -91,7 +91,13 @@ class Exr(unittest.TestCase):
 
     def test_a_broken_file_is_an_error_with_its_name(self) -> None:
         whole = (ROOT / "scenes/sky.exr").read_bytes()
-        for broken in (b"", b"nothing", whole[:200], whole[: len(whole) // 2], (ROOT / "tests/references/room.exr").read_bytes()):
+        for broken in (
+            b"",
+            b"nothing",
+            whole[:200],
+            whole[: len(whole) // 2],
+            (ROOT / "tests/references/room.exr").read_bytes(),
+        ):
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "broken.exr"
                 path.write_bytes(broken)
@@ -123,8 +129,13 @@ def zipped(plain: bytes, lines: int, line_bytes: int) -> bytes:
 class Packets(unittest.TestCase):
     CREATE = bytes([35, 0, 0, 0, 4, 1]) + b"a.exr\0" + struct.pack("<3i", 256, 3, 2) + b"R\0albedo.G\0"
     UPDATE = (
-        bytes([84, 0, 0, 0, 6, 0]) + b"a.exr\0" + struct.pack("<i", 2) + b"R\0G\0"
-        + struct.pack("<4i", 16, 256, 2, 1) + struct.pack("<4q", 0, 1, 2, 2) + struct.pack("<4f", 1, -2, 0.5, 0)
+        bytes([84, 0, 0, 0, 6, 0])
+        + b"a.exr\0"
+        + struct.pack("<i", 2)
+        + b"R\0G\0"
+        + struct.pack("<4i", 16, 256, 2, 1)
+        + struct.pack("<4q", 0, 1, 2, 2)
+        + struct.pack("<4f", 1, -2, 0.5, 0)
     )
 
     def test_packets_in_pieces_of_any_size_give_their_tiles(self) -> None:
@@ -148,11 +159,19 @@ class Packets(unittest.TestCase):
 
 class Events(unittest.TestCase):
     def test_lines_are_read_and_unknown_ones_ignored(self) -> None:
-        line = '{"kind":"progress","phase":"tiles","done":3,"total":12,"seconds":1,"seconds_left":3.4,"new":1}'
+        line = (
+            '{"kind":"progress","phase":"tiles","done":3,"total":12,"seconds":1,"seconds_left":3.4,"new":1}'
+        )
         progress = events.parse(line)
         self.assertEqual((progress.phase, progress.share, progress.seconds_left), ("tiles", 0.25, 3.4))
-        self.assertIsNone(events.parse('{"kind":"progress","phase":"load","done":0,"total":0,"seconds_left":null}').seconds_left)
-        self.assertEqual(str(events.parse('{"kind":"ignored","message":"fog","items":["a","b"]}')), "fog: a, b")
+        self.assertIsNone(
+            events.parse(
+                '{"kind":"progress","phase":"load","done":0,"total":0,"seconds_left":null}'
+            ).seconds_left
+        )
+        self.assertEqual(
+            str(events.parse('{"kind":"ignored","message":"fog","items":["a","b"]}')), "fog: a, b"
+        )
         failure = events.parse('{"kind":"failure","message":"no light","remedy":"add one","status":2}')
         self.assertEqual(str(failure), "no light\nadd one")
         self.assertIsNone(events.parse('{"kind":"of the future"}'))
@@ -174,14 +193,25 @@ class LightUnits(unittest.TestCase):
             edge = math.cos(size / 2)
             t = np.clip((cosines - edge) / (blend * (1 - edge)), 0, 1)
             of_cycles = (t * t * (3 - 2 * t)).mean()
-            of_gltf = (np.clip((cosines - math.cos(outer)) / (math.cos(inner) - math.cos(outer)), 0, 1) ** 2).mean()
+            of_gltf = (
+                np.clip((cosines - math.cos(outer)) / (math.cos(inner) - math.cos(outer)), 0, 1) ** 2
+            ).mean()
             self.assertAlmostEqual(of_gltf / of_cycles, 1, delta=1e-3)
 
 
 class Command(unittest.TestCase):
     def test_settings_become_options(self) -> None:
         settings = command.Settings(
-            (160, 90), (10, 20, 0, 90), "draft", 60.0, None, True, True, 0, ["tcp:a:1", "emulated:2"], ["Z", "N"]
+            (160, 90),
+            (10, 20, 0, 90),
+            "draft",
+            60.0,
+            None,
+            True,
+            True,
+            0,
+            ["tcp:a:1", "emulated:2"],
+            ["Z", "N"],
         )
         self.assertEqual(
             " ".join(settings.arguments()),
@@ -245,13 +275,17 @@ class Pictures(unittest.TestCase):
             raw = zlib.decompress(encoded[begin + 4 : begin + 4 + length])
             lines = np.frombuffer(raw, np.uint8).reshape(2, -1)
             decoded = np.stack([lines[0, 1:], lines[0, 1:] + lines[1, 1:]])
-            np.testing.assert_array_equal(decoded.view(np.dtype(kind).newbyteorder(">")).reshape(2, 3, 3), pixels)
+            np.testing.assert_array_equal(
+                decoded.view(np.dtype(kind).newbyteorder(">")).reshape(2, 3, 3), pixels
+            )
 
     def test_notices_name_the_first_and_count_the_others(self) -> None:
         notices = Notices()
         for index in range(7):
             notices.add("fog is not rendered", f"cube {index}")
-        self.assertEqual(notices.lines(), ["fog is not rendered: cube 0, cube 1, cube 2, cube 3, cube 4 and 2 more"])
+        self.assertEqual(
+            notices.lines(), ["fog is not rendered: cube 0, cube 1, cube 2, cube 3, cube 4 and 2 more"]
+        )
 
 
 class Zip(unittest.TestCase):
@@ -275,7 +309,9 @@ class Zip(unittest.TestCase):
     def test_platforms_are_those_of_the_program(self) -> None:
         windows = b"MZ" + bytes(58) + struct.pack("<I", 64) + b"PE\0\0" + struct.pack("<H", 0x8664)
         self.assertEqual(build.platform_of(windows), "windows-x64")
-        self.assertEqual(build.platform_of(b"\xcf\xfa\xed\xfe" + struct.pack("<I", 0x0100000C)), "macos-arm64")
+        self.assertEqual(
+            build.platform_of(b"\xcf\xfa\xed\xfe" + struct.pack("<I", 0x0100000C)), "macos-arm64"
+        )
         with self.assertRaises(build.BuildError):
             build.platform_of(b"#!/bin/sh\n")
 

@@ -57,7 +57,9 @@ def add_camera(
     Raises `CameraError` if there is none, or one that cannot be rendered.
     """
     if ob is None:
-        raise CameraError("The scene has no camera: add one, or choose it as Camera in the scene's properties.")
+        raise CameraError(
+            "The scene has no camera: add one, or choose it as Camera in the scene's properties."
+        )
     if ob.type != "CAMERA":
         raise CameraError(f"{ob.name} is no camera: choose one as Camera in the scene's properties.")
     matrix = node_matrix(ob.matrix_world)
@@ -132,9 +134,7 @@ def _depth_of_field(
         extras["focus"] = distance
 
 
-def _panorama(
-    lens: bpy.types.Camera, frame: Frame, camera: dict[str, Any], extras: dict[str, Any]
-) -> None:
+def _panorama(lens: bpy.types.Camera, frame: Frame, camera: dict[str, Any], extras: dict[str, Any]) -> None:
     # Before Blender 5.0 these are properties of Cycles.
     stated = lens if hasattr(lens, "panorama_type") else getattr(lens, "cycles", None)
     kind = getattr(stated, "panorama_type", "EQUIRECTANGULAR")
@@ -142,8 +142,14 @@ def _panorama(
         raise CameraError(
             f"Panoramas of the type {kind.replace('_', ' ').title()} are not rendered: choose Equirectangular."
         )
-    west, east = (getattr(stated, name, limit) for name, limit in (("longitude_min", -math.pi), ("longitude_max", math.pi)))
-    south, north = (getattr(stated, name, limit) for name, limit in (("latitude_min", -math.pi / 2), ("latitude_max", math.pi / 2)))
+    west, east = (
+        getattr(stated, name, limit)
+        for name, limit in (("longitude_min", -math.pi), ("longitude_max", math.pi))
+    )
+    south, north = (
+        getattr(stated, name, limit)
+        for name, limit in (("latitude_min", -math.pi / 2), ("latitude_max", math.pi / 2))
+    )
     if abs(west + east) > 1e-4 or abs(south + north) > 1e-4:
         raise CameraError(
             "Panoramas are rendered around the view direction: state a Min. of minus the Max. for latitude and "

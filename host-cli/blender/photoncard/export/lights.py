@@ -66,9 +66,7 @@ def _colour(light: bpy.types.Light, notices: Notices) -> tuple[float, float, flo
     return colour[0] * factor, colour[1] * factor, colour[2] * factor
 
 
-def _emission(
-    tree: bpy.types.NodeTree, name: str, notices: Notices
-) -> tuple[float, float, float] | None:
+def _emission(tree: bpy.types.NodeTree, name: str, notices: Notices) -> tuple[float, float, float] | None:
     """Colour times strength that a light's nodes state; `None` for no emission."""
     output = active_output(tree)
     end = resolve(Place(output.inputs["Surface"], ())) if output else None
@@ -123,9 +121,7 @@ def _area(
     width = light.size
     height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
     scale = world.to_scale()
-    area = light_units.ellipse_or_rectangle(
-        abs(width * scale.x), abs(height * scale.y), is_ellipse
-    )
+    area = light_units.ellipse_or_rectangle(abs(width * scale.x), abs(height * scale.y), is_ellipse)
     radiance = light_units.area_radiance(light.energy, max(area, 1e-12), getattr(light, "normalize", True))
     return {
         "shape": "ellipse" if is_ellipse else "rectangle",

@@ -1,4 +1,4 @@
-"""Exports evaluated meshes: triangles by material, with the normals and texture coordinates of their corners."""
+"""Exports evaluated meshes: triangles by material, with normals and texture coordinates of corners."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class MeshExporter:
     def mesh_of(self, ob: bpy.types.Object, real: bpy.types.Object) -> int | None:
         """Index of the mesh of an evaluated object; `None` if it has no faces.
 
-        `real` is the object that states the materials: it differs from `ob` for an instance of geometry nodes.
+        `real` is the object that states the materials: another than `ob` for instances of geometry nodes.
         """
         if ob.type != "MESH":
             # The faces of curves, texts, surfaces and metaballs are instances of their own, of this type.
@@ -45,9 +45,7 @@ class MeshExporter:
             self._known[key] = self._add(ob.data, ob.name, materials)
         return self._known[key]
 
-    def _add(
-        self, mesh: bpy.types.Mesh, name: str, materials: list[bpy.types.Material | None]
-    ) -> int | None:
+    def _add(self, mesh: bpy.types.Mesh, name: str, materials: list[bpy.types.Material | None]) -> int | None:
         primitives = []
         corners = Corners(mesh, name, self._notices)
         for slot, triangles in corners.by_material(len(materials)):

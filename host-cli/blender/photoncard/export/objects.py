@@ -38,7 +38,10 @@ class Exported:
         arguments = [scene, *self.world.write(folder)]
         if self.energy_compensation:
             arguments.append("--energy-compensation")
-        stated = {node.get("extras", {}).get("photoncard", {}).get("light_group") for node in self.glb.root.get("nodes", [])}
+        stated = {
+            node.get("extras", {}).get("photoncard", {}).get("light_group")
+            for node in self.glb.root.get("nodes", [])
+        }
         if stated - {None}:
             arguments += ["--light-groups", "file"]
         if self.world.light_group in self.light_groups and self.world.is_lit:
@@ -120,4 +123,6 @@ class _Exporter:
     def _note_rays(self, ob: bpy.types.Object) -> None:
         hidden = [kind for kind in _RAYS if not getattr(ob, f"visible_{kind}")]
         if hidden:
-            self.notices.add("objects are visible to all rays but the camera's", f"{ob.name} ({', '.join(hidden)})")
+            self.notices.add(
+                "objects are visible to all rays but the camera's", f"{ob.name} ({', '.join(hidden)})"
+            )

@@ -50,7 +50,9 @@ class Surface:
     @property
     def is_glossy(self) -> bool:
         """True if anything but a Lambertian base reflects."""
-        return any(value.texels.any() for value in (self.metallic, self.specular, self.coat, self.transmission))
+        return any(
+            value.texels.any() for value in (self.metallic, self.specular, self.coat, self.transmission)
+        )
 
 
 _EMPTY = Surface(alpha=constant(0.0))
@@ -114,9 +116,16 @@ class SurfaceReader:
                 self._note(f"{what} of Principled BSDF is not rendered")
         level, tint = self._value(end, "Specular IOR Level"), self._value(end, "Specular Tint")
         node = end.socket.node
-        emission = combine(
-            node, lambda a, b: a * b, self._value(end, "Emission Color"), self._value(end, "Emission Strength")
-        ) if self._emits(end) else constant(0.0)
+        emission = (
+            combine(
+                node,
+                lambda a, b: a * b,
+                self._value(end, "Emission Color"),
+                self._value(end, "Emission Strength"),
+            )
+            if self._emits(end)
+            else constant(0.0)
+        )
         coat = self._value(end, "Coat Weight")
         if coat.texels.any() and self._is_stated(end, "Coat IOR", 1.5):
             self._note("coats have an IOR of 1.5")
@@ -161,7 +170,9 @@ class SurfaceReader:
                 value = replace(value, mapping=replace(value.mapping, uv_map=node.uv_map))
             return NormalMap(value, constant_of(input_of(end, "Strength"))[0])
         except (Unsupported, Unreadable) as reason:
-            self._note(f"normals are those of the mesh ({reason}); bake them to an image texture to keep them")
+            self._note(
+                f"normals are those of the mesh ({reason}); bake them to an image texture to keep them"
+            )
             return None
 
     def _diffuse(self, end: Place) -> Surface:
@@ -210,8 +221,12 @@ class SurfaceReader:
             return _EMPTY
         # A tinted sheet of air.
         return Surface(
-            base=colour, roughness=constant(0.0), ior=1.0, specular=constant(0.0),
-            transmission=constant(1.0), is_wall=True,
+            base=colour,
+            roughness=constant(0.0),
+            ior=1.0,
+            specular=constant(0.0),
+            transmission=constant(1.0),
+            is_wall=True,
         )
 
     def _emission(self, end: Place) -> Surface:
@@ -275,7 +290,9 @@ class SurfaceReader:
                     shown,
                     base=_product(node, shown.base, part),
                     specular=_product(node, shown.specular, part),
-                    emission=_sum(node, _product(node, shown.emission, part), _product(node, other.emission, others)),
+                    emission=_sum(
+                        node, _product(node, shown.emission, part), _product(node, other.emission, others)
+                    ),
                 )
         if _kind(first) != _kind(second):
             self._note("a Mix Shader of unlike shaders is rendered with the mean of their parameters")

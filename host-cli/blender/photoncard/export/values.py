@@ -131,7 +131,9 @@ def combine(node: bpy.types.Node, function: Callable[..., np.ndarray], *values: 
         raise Unsupported(node, "it joins textures of different mappings")
     texels = function(*of_one_size(*values))
     images = [value.image for value in values if value.image is not None]
-    return Value(texels.astype(np.float32), next(iter(mappings), None), images[0] if len(images) == 1 else None)
+    return Value(
+        texels.astype(np.float32), next(iter(mappings), None), images[0] if len(images) == 1 else None
+    )
 
 
 def of_one_size(*values: Value) -> list[np.ndarray]:
@@ -279,7 +281,8 @@ def _product_with_colours(first: Value, second: Value) -> Value | None:
     """Product of a colour attribute and another value, which glTF states as it is."""
     for one, other in ((first, second), (second, first)):
         if one.colours is not None and other.colours is None and one.mapping is None:
-            return replace(other.map(lambda texels: texels * one.texels), colours=one.colours)
+            factor = one.texels
+            return replace(other.map(lambda texels, factor=factor: texels * factor), colours=one.colours)
     return None
 
 
@@ -330,9 +333,7 @@ _FUNCTIONS: dict[str, Callable[..., np.ndarray]] = {
 
 def _invert(end: Place) -> Value:
     factor, colour = (value_of(input_of(end, name)) for name in ("Fac", "Color"))
-    return combine(
-        end.socket.node, lambda t, a: _with_alpha(a + t * (1 - 2 * a), a[..., 3]), factor, colour
-    )
+    return combine(end.socket.node, lambda t, a: _with_alpha(a + t * (1 - 2 * a), a[..., 3]), factor, colour)
 
 
 def _gamma(end: Place) -> Value:
@@ -370,7 +371,8 @@ def _hsv(colour: np.ndarray) -> np.ndarray:
     high, low = colour[..., :3].max(axis=-1), colour[..., :3].min(axis=-1)
     span = np.where(high > low, high - low, 1)
     hue = np.select(
-        [high == red, high == green], [(green - blue) / span % 6, (blue - red) / span + 2],
+        [high == red, high == green],
+        [(green - blue) / span % 6, (blue - red) / span + 2],
         (red - green) / span + 4,
     )
     hue = np.where(high > low, hue / 6, 0)
