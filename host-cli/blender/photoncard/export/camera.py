@@ -140,7 +140,8 @@ def _panorama(lens: bpy.types.Camera, frame: Frame, camera: dict[str, Any], extr
     kind = getattr(stated, "panorama_type", "EQUIRECTANGULAR")
     if kind != "EQUIRECTANGULAR":
         raise CameraError(
-            f"Panoramas of the type {kind.replace('_', ' ').title()} are not rendered: choose Equirectangular."
+            f"Panoramas of the type {kind.replace('_', ' ').title()} are not rendered: "
+            "choose Equirectangular."
         )
     west, east = (
         getattr(stated, name, limit)
@@ -152,8 +153,8 @@ def _panorama(lens: bpy.types.Camera, frame: Frame, camera: dict[str, Any], extr
     )
     if abs(west + east) > 1e-4 or abs(south + north) > 1e-4:
         raise CameraError(
-            "Panoramas are rendered around the view direction: state a Min. of minus the Max. for latitude and "
-            "longitude, and turn the camera."
+            "Panoramas are rendered around the view direction: state a Min. of minus the Max. for latitude "
+            "and longitude, and turn the camera."
         )
     camera["type"] = "perspective"
     camera["perspective"] = {"aspectRatio": frame.width / frame.height, "yfov": 1.0, "znear": 1e-3}

@@ -12,7 +12,7 @@ from ..glb import Glb
 from ..notices import Notices
 from .images import ImageStore, is_linear, linear_pixels
 from .surfaces import NormalMap, Surface
-from .values import Mapping, Value, constant, mappings_of, of_one_size
+from .value import Mapping, Value, constant, mappings_of, of_one_size
 
 _MOST_UV_MAPS = 2
 _WRAPS = {"REPEAT": 10497, "EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648}

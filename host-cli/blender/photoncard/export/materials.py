@@ -10,7 +10,7 @@ from .images import ImageStore
 from .material_writer import MaterialUse, MaterialWriter
 from .nodes import has_nodes
 from .surfaces import Surface, SurfaceReader
-from .values import constant
+from .value import constant
 
 
 class MaterialExporter:

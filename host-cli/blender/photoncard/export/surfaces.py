@@ -11,7 +11,8 @@ import numpy as np
 from ..notices import Notices
 from .images import Unreadable
 from .nodes import Place, Unsupported, active_output, input_of, is_linked, resolve
-from .values import Value, combine, constant, constant_of, value_of
+from .value import Value, combine, constant
+from .values import constant_of, value_of
 
 
 @dataclass(frozen=True)

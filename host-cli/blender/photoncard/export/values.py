@@ -1,82 +1,17 @@
-"""Values of node sockets: the same everywhere, or given by the texels of an image."""
+"""Reads the values of node sockets."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from .images import check_readable, linear_pixels
+from .images import check_readable
 from .nodes import Place, Unsupported, input_of, resolve
-
-
-@dataclass(frozen=True)
-class Mapping:
-    """Texture coordinates: a UV map, by default the active one, and glTF's transform of it."""
-
-    uv_map: str = ""
-    offset: tuple[float, float] = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: tuple[float, float] = (1.0, 1.0)
-    wrap: str = "REPEAT"
-    is_nearest: bool = False
-
-
-@dataclass(frozen=True)
-class Value:
-    """A colour with alpha, or a number in all four: linear."""
-
-    stated: np.ndarray | None
-    """Texels; `None` for those of the image, unchanged."""
-    mapping: Mapping | None = None
-    image: bpy.types.Image | None = None
-    """The one image that the texels are computed from."""
-    colours: str | None = None
-    """Colour attribute that is a factor of the value."""
-
-    @cached_property
-    def texels(self) -> np.ndarray:
-        """Of the shape (4,), or (height, width, 4) with the bottom line first."""
-        return linear_pixels(self.image) if self.stated is None else self.stated
-
-    @property
-    def is_plain(self) -> bool:
-        """True for an image's colours as they are."""
-        return self.stated is None
-
-    @property
-    def is_constant(self) -> bool:
-        """True for a value that is the same everywhere."""
-        return self.mapping is None and self.colours is None
-
-    @property
-    def number(self) -> float:
-        """A constant as a number."""
-        return float(self.texels[..., 0].mean())
-
-    @property
-    def colour(self) -> tuple[float, float, float]:
-        """A constant as a colour; of a texture the mean."""
-        red, green, blue = self.texels[..., :3].reshape(-1, 3).mean(axis=0).tolist()
-        return red, green, blue
-
-    def map(self, function: Callable[[np.ndarray], np.ndarray]) -> Value:
-        """The value of a function of the texels."""
-        return replace(self, stated=function(self.texels))
-
-
-def constant(value: object) -> Value:
-    """A constant of a number or of a tuple of three or four."""
-    numbers = np.atleast_1d(np.array(value, np.float32))
-    if len(numbers) == 1:
-        numbers = np.repeat(numbers, 4)
-    elif len(numbers) == 3:
-        numbers = np.append(numbers, np.float32(1))
-    return Value(numbers)
+from .value import Mapping, Value, combine, constant, grey, with_alpha
 
 
 def constant_of(place: Place) -> tuple[float, float, float, float]:
@@ -107,62 +42,11 @@ def value_of(place: Place) -> Value:
     # A number that is fed by a colour is its grey value.
     if place.socket.type == "VALUE" and end.socket.type in {"RGBA", "VECTOR"}:
         weights = [1 / 3, 1 / 3, 1 / 3] if end.socket.type == "VECTOR" else _LUMINANCE
-        return value.map(lambda texels: _grey(texels @ np.array([*weights, 0], np.float32)))
+        return value.map(lambda texels: grey(texels @ np.array([*weights, 0], np.float32)))
     return value
 
 
 _LUMINANCE = [0.2126, 0.7152, 0.0722]
-
-
-def mappings_of(*values: Value) -> set[Mapping]:
-    """The mappings of the textures among values."""
-    return {value.mapping for value in values if value.mapping is not None}
-
-
-def combine(node: bpy.types.Node, function: Callable[..., np.ndarray], *values: Value) -> Value:
-    """The value of a function of several values, of which textures have one mapping.
-
-    Raises `Unsupported`.
-    """
-    mappings = mappings_of(*values)
-    if any(value.colours is not None for value in values):
-        raise Unsupported(node, "it changes a colour attribute")
-    if len(mappings) > 1:
-        raise Unsupported(node, "it joins textures of different mappings")
-    texels = function(*of_one_size(*values))
-    images = [value.image for value in values if value.image is not None]
-    return Value(
-        texels.astype(np.float32), next(iter(mappings), None), images[0] if len(images) == 1 else None
-    )
-
-
-def of_one_size(*values: Value) -> list[np.ndarray]:
-    """Texels of values, those of textures in the size of the largest."""
-    sizes = [value.texels.shape[:2] for value in values if value.texels.ndim == 3]
-    if not sizes:
-        return [value.texels for value in values]
-    size = (max(height for height, _ in sizes), max(width for _, width in sizes))
-    return [_resized(value.texels, size) for value in values]
-
-
-def _resized(texels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    if texels.ndim == 1 or texels.shape[:2] == size:
-        return texels
-    rows = np.arange(size[0]) * texels.shape[0] // size[0]
-    columns = np.arange(size[1]) * texels.shape[1] // size[1]
-    return texels[rows[:, None], columns]
-
-
-def _grey(values: np.ndarray) -> np.ndarray:
-    return np.repeat(np.asarray(values, np.float32)[..., None], 4, axis=-1)
-
-
-def _with_alpha(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    alpha = np.broadcast_to(alpha, colour.shape[:-1])
-    return np.concatenate([colour[..., :3], alpha[..., None]], axis=-1)
-
-
-# --- Readers of nodes: of the output `end`.
 
 
 def _own(end: Place) -> Value:
@@ -186,7 +70,7 @@ def _image(end: Place) -> Value:
     )
     check_readable(node.image)
     colour = Value(None, mapping, node.image)
-    return colour.map(lambda texels: _grey(texels[..., 3])) if end.socket.name == "Alpha" else colour
+    return colour.map(lambda texels: grey(texels[..., 3])) if end.socket.name == "Alpha" else colour
 
 
 def _mapping(vector: Place) -> Mapping:
@@ -271,7 +155,7 @@ def _blended(
     def mixed(t: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         a, b, t = np.broadcast_arrays(a, b, t)
         result = a + t * (blend(a, b) - a)
-        result = _with_alpha(result, a[..., 3] if kind != "MIX" else result[..., 3])
+        result = with_alpha(result, a[..., 3] if kind != "MIX" else result[..., 3])
         return np.clip(result, 0, 1) if is_clamped else result
 
     return combine(node, mixed, factor, first, second)
@@ -333,19 +217,19 @@ _FUNCTIONS: dict[str, Callable[..., np.ndarray]] = {
 
 def _invert(end: Place) -> Value:
     factor, colour = (value_of(input_of(end, name)) for name in ("Fac", "Color"))
-    return combine(end.socket.node, lambda t, a: _with_alpha(a + t * (1 - 2 * a), a[..., 3]), factor, colour)
+    return combine(end.socket.node, lambda t, a: with_alpha(a + t * (1 - 2 * a), a[..., 3]), factor, colour)
 
 
 def _gamma(end: Place) -> Value:
     colour, gamma = (value_of(input_of(end, name)) for name in ("Color", "Gamma"))
-    return combine(end.socket.node, lambda a, b: _with_alpha(_safe_power(a, b), a[..., 3]), colour, gamma)
+    return combine(end.socket.node, lambda a, b: with_alpha(_safe_power(a, b), a[..., 3]), colour, gamma)
 
 
 def _bright_contrast(end: Place) -> Value:
     colour, bright, contrast = (value_of(input_of(end, name)) for name in ("Color", "Bright", "Contrast"))
 
     def changed(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        return _with_alpha(np.maximum((1 + c) * a + b - 0.5 * c, 0), a[..., 3])
+        return with_alpha(np.maximum((1 + c) * a + b - 0.5 * c, 0), a[..., 3])
 
     return combine(end.socket.node, changed, colour, bright, contrast)
 
@@ -361,7 +245,7 @@ def _hue_saturation(end: Place) -> Value:
         turned[..., 1] = np.clip(turned[..., 1] * saturation[..., 0], 0, 1)
         turned[..., 2] = turned[..., 2] * value[..., 0]
         mixed = colour[..., :3] + factor[..., :3] * (_rgb(turned) - colour[..., :3])
-        return _with_alpha(np.maximum(mixed, 0), colour[..., 3])
+        return with_alpha(np.maximum(mixed, 0), colour[..., 3])
 
     return combine(end.socket.node, changed, *(value_of(input_of(end, name)) for name in names))
 
@@ -401,7 +285,7 @@ def _curves(end: Place) -> Value:
         curved = np.stack(
             [np.interp(combined[..., channel], steps, tables[channel]) for channel in range(3)], axis=-1
         )
-        return _with_alpha(colour[..., :3] + factor[..., :3] * (curved - colour[..., :3]), colour[..., 3])
+        return with_alpha(colour[..., :3] + factor[..., :3] * (curved - colour[..., :3]), colour[..., 3])
 
     return combine(node, changed, *(value_of(input_of(end, name)) for name in ("Fac", "Color")))
 
@@ -414,14 +298,14 @@ def _ramp(end: Place) -> Value:
     def changed(factor: np.ndarray) -> np.ndarray:
         channels = [np.interp(factor[..., 0], steps, table[:, channel]) for channel in range(4)]
         colour = np.stack(channels, axis=-1)
-        return _grey(colour[..., 3]) if end.socket.name == "Alpha" else colour
+        return grey(colour[..., 3]) if end.socket.name == "Alpha" else colour
 
     return combine(node, changed, value_of(input_of(end, "Fac")))
 
 
 def _grey_value(end: Place) -> Value:
     value = value_of(input_of(end, "Color"))
-    return combine(end.socket.node, lambda a: _grey(a[..., :3] @ np.array(_LUMINANCE, np.float32)), value)
+    return combine(end.socket.node, lambda a: grey(a[..., :3] @ np.array(_LUMINANCE, np.float32)), value)
 
 
 def _separate(end: Place) -> Value:
@@ -431,7 +315,7 @@ def _separate(end: Place) -> Value:
     is_hsv = getattr(node, "mode", "RGB") == "HSV"
     if getattr(node, "mode", "RGB") not in {"RGB", "HSV"}:
         raise Unsupported(node, f"its mode is {node.mode}")
-    return combine(node, lambda a: _grey((_hsv(a) if is_hsv else a)[..., channel]), colour)
+    return combine(node, lambda a: grey((_hsv(a) if is_hsv else a)[..., channel]), colour)
 
 
 def _join(end: Place) -> Value:
@@ -442,7 +326,7 @@ def _join(end: Place) -> Value:
     def joined(*channels: np.ndarray) -> np.ndarray:
         stacked = np.stack(np.broadcast_arrays(*(channel[..., 0] for channel in channels)), axis=-1)
         colour = _rgb(stacked) if getattr(node, "mode", "RGB") == "HSV" else stacked
-        return _with_alpha(colour, np.float32(1))
+        return with_alpha(colour, np.float32(1))
 
     return combine(node, joined, *(value_of(Place(socket, end.groups)) for socket in node.inputs))
 
