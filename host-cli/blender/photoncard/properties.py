@@ -71,7 +71,7 @@ class SceneSettings(bpy.types.PropertyGroup):
     )
     use_bake: BoolProperty(
         name="Bake World Nodes",
-        description="Render a Sky Texture and other nodes of the world to a map, by Cycles, before each frame",
+        description="Render a Sky Texture and other nodes of the world to a map by Cycles before each frame",
         default=True,
     )
     cards: CollectionProperty(type=Card)
