@@ -233,7 +233,7 @@ fn with_cache(settings: &mut RenderSettings, cache: bool) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn readings_and_irradiance_pictures_do_not_depend_on_order_or_cards(
         order in prop::sample::select(vec![GatherOrder::Naive, GatherOrder::DirectionBins, GatherOrder::Hash, GatherOrder::Sort, GatherOrder::Buckets]),

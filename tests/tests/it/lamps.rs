@@ -12,6 +12,9 @@ const FLOOR: u32 = 0;
 const PANEL: u32 = 1;
 const MIRROR: u32 = 2;
 const EMISSION: f32 = 5.0;
+/// Directions that define the right of a picture, as those of the axis do not.
+const DOWN: Vec3 = Vec3::new(0.0, -1.0, 0.001);
+const UP: Vec3 = Vec3::new(0.0, 1.0, 0.001);
 
 const LAMP: Visibility = Visibility { camera: false, light: false };
 const HIDDEN: Visibility = Visibility { camera: false, light: true };
@@ -37,7 +40,7 @@ fn below_panel(visibility: Visibility, emission: f32) -> Scene {
     };
     let materials = vec![lambertian("floor", 0.5), panel, Material::new("mirror", smooth)];
     let triangles = [level(Vec3::ZERO, true, FLOOR), level(Vec3::Y, false, PANEL)].concat();
-    scene(triangles, materials, camera(Vec3::new(0.0, 2.0, 0.0), Vec3::NEG_Y))
+    scene(triangles, materials, camera(Vec3::new(0.0, 2.0, 0.0), DOWN))
 }
 
 fn with_bulb(mut lit: Scene) -> Scene {
@@ -92,12 +95,12 @@ fn a_camera_looks_through_what_it_does_not_see_from_both_sides() {
         assert!(floor > 0.3 && floor < 0.5 * EMISSION, "{visibility:?}: {floor}");
         // From below, the panel's front is before the sky, which is black.
         let mut from_below = lit.clone();
-        from_below.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), Vec3::Y)];
+        from_below.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), UP)];
         assert_eq!(centre(&from_below), 0.0, "{visibility:?}");
     }
     let mut seen = below_panel(Visibility { camera: true, ..LAMP }, EMISSION);
     assert!(centre(&seen) < 0.5 * EMISSION, "a lamp is open from behind");
-    seen.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), Vec3::Y)];
+    seen.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), UP)];
     assert_eq!(centre(&seen), EMISSION);
 }
 
@@ -109,7 +112,7 @@ fn a_mirror_shows_a_lamp_that_the_camera_does_not_see() {
             .iter_mut()
             .filter(|triangle| triangle.material == FLOOR)
             .for_each(|t| t.material = MIRROR);
-        lit.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), Vec3::NEG_Y)];
+        lit.cameras = vec![camera(Vec3::new(0.0, 0.5, 0.0), DOWN)];
         assert!((centre(&lit) / EMISSION - 1.0).abs() < 1e-3, "{visibility:?}: {}", centre(&lit));
     }
 }

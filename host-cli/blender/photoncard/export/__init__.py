@@ -1,0 +1,1 @@
+"""Exports an evaluated scene of Blender to glTF with the extras of photoncard."""
