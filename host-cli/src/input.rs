@@ -28,6 +28,13 @@ pub(crate) fn load(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Fai
     Input::open(options, dram_bytes)?.into_rest()
 }
 
+/// Does [`load`], and sets the light groups.
+pub(crate) fn load_with_groups(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Failure> {
+    let mut scene = load(options, dram_bytes)?;
+    scene.set_light_groups(&options.light_groups).map_err(Failure::input)?;
+    Ok(scene)
+}
+
 /// Does [`load`], with the second coordinates of all meshes that have them.
 pub(crate) fn load_for_lightmaps(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Failure> {
     Input::open_with(options, dram_bytes, true)?.into_rest()

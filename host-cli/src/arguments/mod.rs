@@ -104,6 +104,7 @@ impl Command {
             Self::Measure(options) => options.progress,
             Self::Bake(options) => options.progress,
             Self::Merge(options) => options.progress,
+            Self::View(options) => options.progress,
             _ => ProgressForm::Text,
         }
     }

@@ -13,6 +13,7 @@ use super::choice::choice;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
+use super::progress::ProgressForm;
 use super::scene::SceneOptions;
 use super::schedule::ScheduleOptions;
 use super::threads::threads;
@@ -55,6 +56,9 @@ pub(crate) struct ViewOptions {
     /// Print nothing but the page's address
     #[arg(long)]
     pub(crate) quiet: bool,
+    /// Form in which notices and a failure are reported
+    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
+    pub(crate) progress: ProgressForm,
 }
 
 impl ViewOptions {

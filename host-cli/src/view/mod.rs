@@ -53,7 +53,7 @@ use self::request::{MAX_PIXELS, MAX_SIDE, is_size_of_view};
 use self::saving::Folder;
 use self::state::{Start, View};
 use self::wish::{Sketch, Wish};
-use crate::arguments::{SceneOptions, ViewOptions};
+use crate::arguments::ViewOptions;
 use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::input;
@@ -143,7 +143,7 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
 
 /// Loads the scene, and gives the picture the camera's aspect ratio. Assignments (`--set`) are not applied.
 fn load(options: &ViewOptions, dram_bytes: u64, settings: &mut RenderSettings) -> Result<Scene, Failure> {
-    let scene = read(&options.scene, dram_bytes)?;
+    let scene = input::load_with_groups(&options.scene, dram_bytes)?;
     settings.picture.light_groups = scene.light_groups.names().to_vec();
     let camera = settings.camera(&scene)?;
     notices::say_ignored(&options.scene, &scene, &Uses::of(&options.scene, &settings.picture, None))?;
@@ -151,13 +151,6 @@ fn load(options: &ViewOptions, dram_bytes: u64, settings: &mut RenderSettings) -
     if let Some(notice) = misfit.filter(|_| !options.quiet) {
         say(format_args!("photoncard: {notice}"));
     }
-    Ok(scene)
-}
-
-/// Reads the scene and its light groups. Assignments (`--set`) are not applied.
-fn read(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Failure> {
-    let mut scene = input::load(options, dram_bytes)?;
-    scene.set_light_groups(&options.light_groups).map_err(Failure::input)?;
     Ok(scene)
 }
 

@@ -17,7 +17,6 @@ use super::canvas::Origin;
 use super::describe::SceneFacts;
 use super::fitting::Fitting;
 use super::hub::{Hub, Job, Settled};
-use super::read;
 use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
 use super::wish::Sketch;
@@ -96,7 +95,7 @@ impl<'a> Painter<'a> {
     /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them,
     /// pages are told, and the scene stays.
     fn reload(&mut self) {
-        let scene = match read(self.options, self.dram_bytes) {
+        let scene = match input::load_with_groups(self.options, self.dram_bytes) {
             Ok(scene) => scene,
             Err(failure) => {
                 let text = format!("the scene is not read again: {}", failure.line());
