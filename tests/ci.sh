@@ -251,6 +251,22 @@ test_python() {
     "$folder/bin/python" -B tests/notebook.py
 }
 
+# The extension of Blender, from its zip in the Blender that PyPI has, and a viewport's session without it.
+test_blender() {
+    local folder=${CARGO_TARGET_DIR:-target}/blender zip=("$1"/photoncard-blender-*.zip) tests=host-cli/blender/tests
+    if ! python3 -m venv --clear "$folder" || ! "$folder/bin/pip" install --quiet "bpy==4.5.*"; then
+        go_without "the extension of Blender" "bpy cannot be installed from PyPI; it takes the Python of its Blender, 3.11"
+        return
+    fi
+    "$folder/bin/python" -B -m unittest discover --start-directory "$tests" --pattern test_files.py
+    PHOTONCARD=$2 "$folder/bin/python" -B "$tests/test_session.py"
+    PHOTONCARD_ZIP=${zip[0]} "$folder/bin/python" -B "$tests/test_blender.py" >"$1/said" 2>&1 || {
+        cat "$1/said" >&2
+        fail "the extension fails in Blender"
+    }
+    tail -3 "$1/said"
+}
+
 check_packages() {
     step "packages of a release"
     local program=${CARGO_TARGET_DIR:-target}/debug/photoncard dist
@@ -259,6 +275,8 @@ check_packages() {
     host-cli/package.sh --check --binary "$(realpath "$program")" --out "$dist"
     step "package of Python"
     test_python "$dist"
+    step "extension of Blender"
+    test_blender "$dist" "$(realpath "$program")"
     rm -r "$dist"
 
     step "packages of crates"

@@ -7,7 +7,9 @@ import tempfile
 from collections.abc import Iterable
 
 import bpy
+import gpu
 import numpy as np
+from gpu_extras.presets import draw_texture_2d
 
 from . import command, events, exr
 from .baking import bake_world
@@ -17,6 +19,7 @@ from .glb import TooLarge
 from .packets import Tile
 from .passes import matte_fields, passes_of
 from .properties import program_stated
+from .viewport import Viewport, region_camera
 
 IDENTIFIER = "PHOTONCARD"
 
@@ -57,6 +60,45 @@ class PhotoncardEngine(bpy.types.RenderEngine):
     def _fail(self, message: str) -> None:
         self.report({"ERROR"}, message)
         self.error_set(message)
+
+    def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Notes changes of the scene that a viewport shows."""
+        self._shown().update(depsgraph)
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Shows the picture so far in a viewport."""
+        viewport = self._shown()
+        try:
+            viewport.follow(*region_camera(context), depsgraph)
+        except (TooLarge, command.CommandError, OSError) as error:
+            viewport.error = str(error)
+        self.update_stats("", viewport.error or viewport.status())
+        picture = viewport.picture()
+        if picture is not None:
+            self._draw(picture, context)
+
+    def __del__(self) -> None:
+        viewport = getattr(self, "_viewport", None)
+        if viewport is not None:
+            viewport.free()
+        if hasattr(super(), "__del__"):
+            super().__del__()
+
+    def _shown(self) -> Viewport:
+        # Blender makes engines without calling a constructor in some versions.
+        if getattr(self, "_viewport", None) is None:
+            self._viewport = Viewport(self.tag_redraw)
+        return self._viewport
+
+    def _draw(self, picture: np.ndarray, context: bpy.types.Context) -> None:
+        height, width, _ = picture.shape
+        pixels = gpu.types.Buffer("FLOAT", picture.size, picture.reshape(-1))
+        texture = gpu.types.GPUTexture((width, height), format="RGBA32F", data=pixels)
+        gpu.state.blend_set("ALPHA_PREMULT")
+        self.bind_display_space_shader(context.scene)
+        draw_texture_2d(texture, (0, 0), context.region.width, context.region.height)
+        self.unbind_display_space_shader()
+        gpu.state.blend_set("NONE")
 
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         """States the passes of a view layer."""

@@ -13,6 +13,7 @@ import tempfile
 import time
 import unittest
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -257,6 +258,53 @@ class Scenes(unittest.TestCase):
             bpy.ops.render.render(animation=True)
             frames = [rendering.exr.read(f"{folder}/frame{number:04}.exr").channels["G"] for number in (1, 2)]
         self.assertGreater(np.abs(frames[0] - frames[1]).max(), 0.2)
+
+
+class Viewports(unittest.TestCase):
+    """Drawing needs a window; the picture that is drawn does not."""
+
+    def settle(self, viewport: Any, is_right: Any = lambda _: True) -> np.ndarray:
+        """Follows the scene's camera until the picture is settled and right."""
+        module = importlib.import_module(f"{MODULE}.viewport")
+        end = time.monotonic() + 120
+        while time.monotonic() < end:
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            ob = bpy.context.scene.camera.evaluated_get(depsgraph)
+            size = (48, 32)
+            projection = ob.calc_matrix_camera(depsgraph, x=size[0], y=size[1])
+            camera = module.camera_of(ob.matrix_world.inverted(), projection, size, 0.0)
+            viewport.follow(camera, size, depsgraph)
+            self.assertEqual(viewport.error, "")
+            picture = viewport.picture()
+            if picture is not None and viewport.status() == "Done" and is_right(picture):
+                return picture
+            time.sleep(0.05)
+        self.fail("the viewport does not settle")
+
+    def test_the_picture_is_that_of_a_render_and_follows_changes(self) -> None:
+        module = importlib.import_module(f"{MODULE}.viewport")
+        for make in (scenes.plan, scenes.product):
+            scene = draft(make())
+            scene.camera.data.dof.use_dof = False
+            scene.render.film_transparent = False
+            scene.render.resolution_x, scene.render.resolution_y = 48, 32
+            with tempfile.TemporaryDirectory() as folder:
+                rendered = rendering.colour(rendering.passes(scene, "PHOTONCARD", Path(folder)))
+            viewport = module.Viewport(lambda: None)
+            try:
+                shown = self.settle(viewport, lambda picture: picture.shape == (32, 48, 4))
+                np.testing.assert_allclose(shown[::-1, :, :3].mean(), rendered.mean(), rtol=TOLERANCE)
+                # A shift or a turn of the camera would show elsewhere what is bright.
+                profiles = [each.mean(axis=(0, 2)) for each in (shown[::-1, :, :3], rendered)]
+                self.assertGreater(np.corrcoef(*profiles)[0, 1], 0.98)
+                for light in bpy.data.lights:
+                    light.energy = 0
+                bpy.context.view_layer.update()
+                viewport._changed_at = 0.0
+                darker = self.settle(viewport, lambda picture: picture.mean() < 0.9 * shown.mean())
+                self.assertLess(darker[..., :3].mean(), 0.9 * shown[..., :3].mean())
+            finally:
+                viewport.free()
 
 
 class Failures(unittest.TestCase):

@@ -16,23 +16,21 @@ use crate::{Material, Scene, Triangle};
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AreaLight {
+    #[serde(default)]
     shape: Shape,
     /// Extents along the node's x and y axes before its scale, metres.
     size: [f32; 2],
     /// Emitted radiance, W/(sr m^2).
     radiance: [f32; 3],
     /// Whether the rays of pixels meet it.
-    #[serde(default = "seen")]
+    #[serde(default)]
     camera: bool,
 }
 
-fn seen() -> bool {
-    true
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Shape {
+    #[default]
     Rectangle,
     Ellipse,
 }

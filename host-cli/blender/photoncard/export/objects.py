@@ -11,7 +11,7 @@ import bpy
 from ..glb import Glb
 from ..notices import Notices
 from .axes import node_matrix
-from .camera import Frame, add_camera
+from .camera import CameraError, Frame, add_camera
 from .clipping import Clipping
 from .lights import add_light
 from .materials import MaterialExporter
@@ -50,9 +50,14 @@ class Exported:
 
 
 def export(
-    depsgraph: bpy.types.Depsgraph, camera: bpy.types.Object | None, frame: Frame, bake: Bake | None = None
+    depsgraph: bpy.types.Depsgraph,
+    camera: bpy.types.Object | None,
+    frame: Frame,
+    bake: Bake | None = None,
+    is_view: bool = False,
 ) -> Exported:
     """Exports an evaluated scene as its view layer shows it to a camera. `bake` renders nodes of the world.
+    A viewport (`is_view`) has a camera of its own, and needs none of the scene.
 
     Raises `CameraError`.
     """
@@ -63,7 +68,11 @@ def export(
     scene = depsgraph.scene
     evaluated = camera.evaluated_get(depsgraph) if camera else None
     exporter.clipping.notice(evaluated, exporter.notices)
-    add_camera(exporter.glb, evaluated, scene.render, frame, exporter.notices)
+    try:
+        add_camera(exporter.glb, evaluated, scene.render, frame, exporter.notices)
+    except CameraError:
+        if not is_view:
+            raise
     if scene.render.use_motion_blur:
         exporter.notices.add("motion blur is not rendered")
     world = depsgraph.view_layer.world_override if hasattr(depsgraph.view_layer, "world_override") else None
