@@ -8,11 +8,12 @@ and Cycles bakes DIFFUSE, direct and indirect without colour, into images of the
 joined before, so that one call bakes them all. Lights are imported from the scene: the baked file has none.
 
 Prints the CPU seconds (user and system, all threads) and errors beside a bake by Cycles of as many samples as
-fit into --minutes of wall time. Those of photoncard are of the whole command, those of Cycles of the call
+fit into --minutes of CPU time. Those of photoncard are of the whole command, those of Cycles of the call
 that bakes, with its tree of triangles, without the import. An error is the root mean square difference of
-texels and channels over the mean of the reference. Texels count if they and their eight neighbours are in a
-chart and lit: a texel that Cycles finds black is inside a solid, where photoncard continues the light around
-it. All bakes by Cycles have different seeds.
+texels and channels over the mean of the reference; that of photoncard includes its bias. Texels count if they
+and their eight neighbours are in a chart and lit. Texels that have less than a twentieth of the mean light by
+Cycles are inside solids or behind sheets, where photoncard continues the light around them: they are printed
+apart. All bakes by Cycles have different seeds.
 
 The Python has bpy 4.5 or later. Options after -- go to both bakes by photoncard.
 """
@@ -22,7 +23,6 @@ import os
 import resource
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +43,8 @@ SETTINGS = {"default": "", "finer": "--spp 16 --gather-rays 64"}
 # How Blender's importer reads lights by photoncard's units.
 LIGHTING = {"radiometric": "COMPAT", "photometric": "SPEC", "watts": "RAW"}
 UNITS_OF_DIFFUSE = np.pi
+# Texels with less than this share of the mean light are inside solids or behind sheets.
+DARK = 0.05
 # A reference has no more samples than this.
 MOST_SAMPLES = 1 << 16
 
@@ -68,16 +70,19 @@ def main() -> None:
 
     own = {name: photoncard(arguments, name, words) for name, words in SETTINGS.items()}
     prepare(arguments, arguments.folder / "default.glb")
-    cycles, seconds_a_sample = {}, 0.0
-    for seed, samples in enumerate(arguments.samples, start=1):
-        start = time.monotonic()
-        cycles[samples] = bake(own["default"].pages, samples, seed)[0]
-        seconds_a_sample = (time.monotonic() - start) / samples
-    count = int(60.0 * arguments.minutes / seconds_a_sample)
-    most = max(arguments.samples[-1], min(count, MOST_SAMPLES))
-    reference, covered = bake(own["default"].pages, most, 0)
-    mask = counted(reference, covered)
+    pages = own["default"].pages
+    seeds = enumerate(arguments.samples, start=1)
+    cycles = {samples: bake(pages, samples, seed)[0] for seed, samples in seeds}
+    many = arguments.samples[-1]
+    most = max(many, min(int(60.0 * arguments.minutes / cycles[many].cpu_s * many), MOST_SAMPLES))
+    reference, covered = bake(pages, most, 0)
+    light = lit(reference, covered)
+    mask = [eroded(texels) for texels in light]
+    if not any(texels.any() for texels in mask):
+        sys.exit("no texel has eight neighbours in its chart; state more --texels-per-metre")
     report(say, own, cycles, (most, reference), mask)
+    dark = [eroded(texels) & ~lit_texels for texels, lit_texels in zip(covered, light, strict=True)]
+    report_dark(say, own, reference, dark)
     show(arguments.folder, own["default"], reference, mask)
     # Blender's module may hang at the end of the process.
     os._exit(0)
@@ -97,7 +102,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("folder", type=Path, help="where files go")
     parser.add_argument("--texels-per-metre", type=float, default=16.0)
     parser.add_argument("--samples", type=counts, default=[16, 64, 256], help="of Cycles, two or more")
-    parser.add_argument("--minutes", type=float, default=10.0, help="wall time of the reference")
+    parser.add_argument("--minutes", type=float, default=10.0, help="CPU time of the reference")
     parser.add_argument("--light-units", choices=LIGHTING, default="radiometric", help="of its lights")
     parser.add_argument("--environment", help="a map with -z in its middle, or a radiance: R,G,B")
     arguments = parser.parse_args(words)
@@ -236,10 +241,10 @@ def read(image: bpy.types.Image) -> np.ndarray:
     return values.reshape(height, width, 4)[::-1].astype(float)
 
 
-def counted(reference: Bake, covered: list[np.ndarray]) -> list[np.ndarray]:
-    """Texels that are in a chart and lit, as their eight neighbours are."""
-    lit = [texels & (page.sum(axis=2) > 0.0) for texels, page in zip(covered, reference.pages, strict=True)]
-    return [eroded(texels) for texels in lit]
+def lit(reference: Bake, covered: list[np.ndarray]) -> list[np.ndarray]:
+    """Texels in charts that are not dark."""
+    dark = DARK * values(reference, covered).sum(axis=1).mean()
+    return [texels & (page.sum(axis=2) > dark) for texels, page in zip(covered, reference.pages, strict=True)]
 
 
 def eroded(mask: np.ndarray) -> np.ndarray:
@@ -283,6 +288,17 @@ def report(
             f"Cycles takes {samples:.0f} samples and {noise.cpu(samples):.1f} CPU s for it, "
             f"{noise.cpu(samples) / found.cpu_s:.2f} times those of photoncard"
         )
+
+
+def report_dark(
+    say: Callable[[str], None], own: dict[str, Bake], reference: Bake, dark: list[np.ndarray]
+) -> None:
+    """Prints the light of dark texels."""
+    count = sum(int(texels.sum()) for texels in dark)
+    if count > 0:
+        light = ", ".join(f"{name} {values(found, dark).mean():.4f}" for name, found in own.items())
+        theirs = values(reference, dark).mean()
+        say(f"dark texels: {count}, by Cycles {theirs:.4f} W/m^2, by photoncard {light}")
 
 
 def line(found: Bake, truth: np.ndarray, mask: list[np.ndarray]) -> str:
