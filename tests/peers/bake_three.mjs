@@ -6,6 +6,8 @@
 // `photoncard render`. three.js and playwright-core are those of FOLDER/node_modules, Chromium is /usr/bin/chromium or $CHROMIUM.
 // The page has no lights, no tone mapping and no environment; pixels are read back from a float target, linear.
 // Prints for each view: mean over the render's, mean error and percentiles of the error relative to the local mean.
+// FOLDER has PNGs: view-N-render, view-N-emissive and view-N-errors, red where the bake is too bright and blue where it is too dark,
+// full at 20 %, black where pixels do not count.
 import { execFileSync } from 'node:child_process';
 import { createServer } from 'node:http';
 import { readFileSync, writeFileSync, existsSync } from 'node:fs';
@@ -62,6 +64,18 @@ window.show = async (at, to, fov, exr) => {
     // Both are rows from the bottom.
     return { png, own: Array.from(own), other: Array.from(texture.image.data) };
 };
+window.paint = shares => {
+    const canvas = Object.assign(document.createElement('canvas'), { width: W, height: H });
+    const image = new ImageData(W, H);
+    shares.forEach((share, index) => {
+        const shown = share === null ? 0 : 255 - Math.min(255, Math.abs(share) / 0.2 * 255);
+        const colour = share === null ? [0, 0, 0] : share > 0 ? [255, shown, shown] : [shown, shown, 255];
+        const [x, y] = [index % W, H - 1 - Math.floor(index / W)];
+        image.data.set([...colour, 255], 4 * (y * W + x));
+    });
+    canvas.getContext('2d').putImageData(image, 0, 0);
+    return canvas.toDataURL('image/png');
+};
 window.ready = true;
 </script>`;
 
@@ -90,20 +104,24 @@ function smooth(light, x, y) {
     return sum > 0;
 }
 
-/** Error of each pixel that counts, relative to its light, of the sums of channels. */
+/** Errors of pixels, relative to their light, of the sums of channels: of each, null where it does not count, and of all. */
 function errors(own, other) {
-    const found = [];
+    const shares = new Array(WIDTH * HEIGHT).fill(null);
     let [a, b] = [0, 0];
     for (let y = 0; y < HEIGHT; y++) for (let x = 0; x < WIDTH; x++) {
         if (!smooth(other, x, y)) continue;
         const sum = light => [0, 1, 2].reduce((sum, c) => sum + light[4 * (y * WIDTH + x) + c], 0);
         const [mine, theirs] = [sum(own), sum(other)];
         [a, b] = [a + mine, b + theirs];
-        found.push(Math.abs(mine - theirs) / theirs);
+        shares[y * WIDTH + x] = (mine - theirs) / theirs;
     }
-    found.sort((a, b) => a - b);
+    const found = shares.filter(share => share !== null).map(Math.abs).sort((a, b) => a - b);
     const percentile = share => found[Math.min(found.length - 1, Math.floor(share * found.length))];
-    return { pixels: found.length, mean: a / b, median: percentile(0.5), p95: percentile(0.95), p99: percentile(0.99) };
+    return { shares, pixels: found.length, mean: a / b, median: percentile(0.5), p95: percentile(0.95), p99: percentile(0.99) };
+}
+
+function writePng(name, url) {
+    writeFileSync(join(folder, name), Buffer.from(url.split(',')[1], 'base64'));
 }
 
 const browser = await chromium.launch({
@@ -131,11 +149,12 @@ for (const form of ['emissive', 'unlit']) {
     if (form === 'unlit') await tab.evaluate('unlit()');
     for (const [number, view] of shown.entries()) {
         const { png, own, other } = await tab.evaluate(view => show(...view), view);
-        writeFileSync(join(folder, `view-${number}-${form}.png`), Buffer.from(png.split(',')[1], 'base64'));
-        const { pixels, mean, median, p95, p99 } = errors(own, other);
+        writePng(`view-${number}-${form}.png`, png);
+        const { shares, pixels, mean, median, p95, p99 } = errors(own, other);
         const percent = share => `${(100 * share).toFixed(2)} %`;
         console.log(`${form} view ${number}: ${pixels} pixels, mean ${percent(mean - 1)} off, median ${percent(median)}, ` +
             `95 % within ${percent(p95)}, 99 % within ${percent(p99)}`);
+        if (form === 'emissive') writePng(`view-${number}-errors.png`, await tab.evaluate(shares => paint(shares), shares));
     }
 }
 await browser.close();
