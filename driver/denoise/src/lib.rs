@@ -1,5 +1,5 @@
-//! Removes noise from a picture by Intel Open Image Denoise (Áfra 2019), a neural network that reads
-//! radiance, albedo and normals.
+//! Removes noise from pictures and lightmaps by Intel Open Image Denoise (Áfra 2019), neural networks of which
+//! that for pictures reads radiance, albedo and normals.
 //!
 //! The library is not part of this program. [`Denoiser::find`] loads version 2 of it at run time, from the
 //! first of these locations that has it:
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use photoncard_picture::film::{Film, PixelValue};
 
 pub use self::library::{DenoiseError, MustStop};
-use self::library::{Device, Input, Library, Quality};
+use self::library::{Device, Input, Kind, Library, Quality};
 pub use self::places::VARIABLE;
 
 /// Open Image Denoise, ready to run on this machine's processor.
@@ -118,16 +118,40 @@ impl Denoiser {
             return Err(DenoiseError::Incomplete { missing });
         }
         let feature = |name, image: &[[f32; 3]]| {
-            let input = Input { images: &[(name, image)], switches: &[], quality: Quality::Balanced };
+            let (kind, quality) = (Kind::Picture, Quality::Balanced);
+            let input = Input { kind, images: &[(name, image)], switches: &[], quality };
             device.run(size, &input, must_stop)
         };
         let [albedo, normal] = [feature("albedo", &albedo)?, feature("normal", &normal)?];
         let images = [("color", &*radiance), ("albedo", &*albedo), ("normal", &*normal)];
-        let input = Input { images: &images, switches: &["hdr", "cleanAux"], quality: Quality::High };
+        let (kind, quality) = (Kind::Picture, Quality::High);
+        let input = Input { kind, images: &images, switches: &["hdr", "cleanAux"], quality };
         let mut denoised = device.run(size, &input, must_stop)?;
         for pixel in background::pixels(&hits_surface, size) {
             denoised[pixel] = radiance[pixel];
         }
         Ok(denoised)
+    }
+
+    /// Returns the denoised values of a lightmap of `size` columns and rows, row by row: irradiance, W/m^2.
+    /// `threads` is the maximum number of threads; `None` for one per core.
+    ///
+    /// # Errors
+    /// As [`Self::radiance`]. [`DenoiseError::Incomplete`] if there are not as many texels.
+    pub fn lightmap(
+        &self,
+        size: [u32; 2],
+        irradiance: &[[f32; 3]],
+        threads: Option<usize>,
+        must_stop: MustStop,
+    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        let size = size.map(|side| side as usize);
+        let texels = size[0] * size[1];
+        if irradiance.len() != texels {
+            return Err(DenoiseError::Incomplete { missing: texels.abs_diff(irradiance.len()) });
+        }
+        let (kind, quality) = (Kind::Lightmap, Quality::High);
+        let input = Input { kind, images: &[("color", irradiance)], switches: &[], quality };
+        Device::new(&self.library, threads)?.run(size, &input, must_stop)
     }
 }

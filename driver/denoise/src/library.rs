@@ -33,8 +33,27 @@ pub(crate) enum Quality {
     High = 6,
 }
 
+/// Kind of a filter: its network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// `RT`, for rendered pictures.
+    Picture,
+    /// `RTLightmap`, for lightmaps of irradiance.
+    Lightmap,
+}
+
+impl Kind {
+    fn name(self) -> &'static CStr {
+        match self {
+            Self::Picture => c"RT",
+            Self::Lightmap => c"RTLightmap",
+        }
+    }
+}
+
 /// Input of a filter.
 pub(crate) struct Input<'a> {
+    pub(crate) kind: Kind,
     /// Name of each image, such as `albedo`, as the library expects it, and the image's pixels.
     pub(crate) images: &'a [(&'a str, &'a [[f32; 3]])],
     /// Names of boolean parameters that are true.
@@ -175,7 +194,7 @@ impl<'a> Device<'a> {
         }
         let [width, height] = size;
         let mut output = vec![[0.0; 3]; width * height];
-        let mut filter = Filter::new(self, size)?;
+        let mut filter = Filter::new(self, input.kind, size)?;
         input.images.iter().for_each(|(name, image)| filter.read(name, image));
         filter.write(&mut output);
         input.switches.iter().for_each(|name| filter.switch_on(name));
@@ -227,11 +246,11 @@ struct Filter<'a> {
 }
 
 impl<'a> Filter<'a> {
-    fn new(device: &'a Device, size: [usize; 2]) -> Result<Self, DenoiseError> {
-        // SAFETY: `handle` is a device; `RT` is the filter for rendered pictures.
-        let handle = unsafe { (device.library.new_filter)(device.handle, c"RT".as_ptr()) };
+    fn new(device: &'a Device, kind: Kind, size: [usize; 2]) -> Result<Self, DenoiseError> {
+        // SAFETY: `handle` is a device, and the name ends in 0.
+        let handle = unsafe { (device.library.new_filter)(device.handle, kind.name().as_ptr()) };
         if handle.is_null() {
-            return Err(device.error().unwrap_or_else(|| failed("it has no filter RT")));
+            return Err(device.error().unwrap_or_else(|| failed("it lacks a filter")));
         }
         Ok(Self { library: device.library, handle, size })
     }

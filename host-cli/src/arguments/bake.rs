@@ -32,7 +32,7 @@ pub(crate) struct BakeOptions {
     #[command(flatten)]
     pub(crate) samples: SensorOptions,
     /// Measure only the K-th of N parts of the texels, and write their light: OUT.part
-    #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "exr", "rgbm"])]
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "exr", "rgbm", "denoise"])]
     pub(crate) part: Option<Part>,
     /// Put together the files of all parts instead of measuring
     #[arg(long, value_name = "PART", num_args = 1.., conflicts_with = "farm", value_parser = part_file)]
@@ -88,6 +88,9 @@ pub(crate) struct PageOptions {
     /// Write the irradiance of each page too, W/m^2: OUT.0.exr, float
     #[arg(long)]
     pub(crate) exr: bool,
+    /// Remove noise by Open Image Denoise, a library that is looked for at run time
+    #[arg(long)]
+    pub(crate) denoise: bool,
     /// Write the irradiance of each page too, as RGBM of a range that extras state: OUT.0.png
     #[arg(long)]
     pub(crate) rgbm: bool,

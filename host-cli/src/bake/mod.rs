@@ -4,9 +4,10 @@ mod files;
 
 use std::path::Path;
 
+use glam::Vec3;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::render::bake::part::{self, Light, Whole};
-use photoncard_driver::render::bake::{BakeError, Baked, Plan};
+use photoncard_driver::render::bake::{BakeError, Baked, Page, Plan};
 use photoncard_driver::render::measure::{Meter, Reading};
 use photoncard_driver::render::{Phase, RenderSettings};
 use photoncard_driver::scene::Scene;
@@ -18,6 +19,7 @@ use crate::failure::Failure;
 use crate::farm;
 use crate::notices::{self, Uses};
 use crate::progress::Progress;
+use crate::render::files::denoiser;
 use crate::render::{assigned, dram_bytes, on_threads};
 use crate::{input, outputs};
 
@@ -41,7 +43,7 @@ pub(crate) fn run(options: &BakeOptions) -> Result<(), Failure> {
 /// Prints the job that bakes on a farm, in parts.
 fn job(options: &BakeOptions, engine: Engine) -> Result<(), Failure> {
     let inputs: Vec<&Path> = input::files(&options.scene).into_iter().map(|(path, _)| path).collect();
-    let merge = farm::Merge::Command { not_in_parts: &["exr", "rgbm"] };
+    let merge = farm::Merge::Command { not_in_parts: &["exr", "rgbm", "denoise"] };
     let work = farm::Work { command: "bake", inputs: &inputs, output: &options.output, merge };
     farm::print(engine, &work, options.job.parts)
 }
@@ -58,6 +60,8 @@ fn check(options: &BakeOptions, settings: &RenderSettings) -> Result<(), Failure
         };
         return Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))));
     }
+    // A missing denoiser is an error before the work.
+    denoiser(options.files.denoise)?;
     let mut inputs = input::files(&options.scene);
     inputs.extend(options.merge.iter().map(|path| (path.as_path(), "a part")));
     outputs::check(&inputs, &[&options.output], &[])?;
@@ -80,7 +84,20 @@ fn bake(options: &BakeOptions, scene: &Scene, settings: &RenderSettings) -> Resu
     } else {
         part::read(&options.merge, &whole).map_err(failure)?
     };
-    files.write(&plan, &Baked::new(&plan, &light)).map_err(failure)
+    let irradiance = denoised(options, Baked::irradiance(&plan, &light))?;
+    files.write(&plan, &Baked::of(&plan, irradiance)).map_err(failure)
+}
+
+/// Pages of irradiance, without noise if that is asked for.
+fn denoised(options: &BakeOptions, mut pages: Vec<Page>) -> Result<Vec<Page>, Failure> {
+    let Some(denoiser) = denoiser(options.files.denoise)? else { return Ok(pages) };
+    for page in &mut pages {
+        let values: Vec<[f32; 3]> = page.values.iter().map(Vec3::to_array).collect();
+        let values = denoiser.lightmap([page.size; 2], &values, options.threads, &|| false);
+        page.values =
+            values.map_err(|error| Failure::work_error(&error))?.into_iter().map(Vec3::from).collect();
+    }
+    Ok(pages)
 }
 
 /// Prints density, pages and sensors.

@@ -1,5 +1,7 @@
 //! Command `photoncard bake`.
 
+use photoncard_driver::exr::{Shown, read};
+
 use crate::support::{Outcome, Room, mirrored_cornell};
 
 const QUICK: [&str; 13] = [
@@ -58,6 +60,38 @@ fn cards_orders_threads_and_parts_give_equal_files() {
     let foreign = bake(&room, &["--seed", "5", "--merge", "1.part", "2.part", "3.part", "-o", "missing.glb"]);
     assert!(foreign.stderr.contains("another bake"), "{}", foreign.stderr);
     assert!(!room.names().contains(&"missing.glb".to_owned()));
+}
+
+/// Irradiance of the texels of a page, in the first channel.
+fn page(room: &Room, name: &str) -> Vec<f64> {
+    let picture = read(&room.path(name), Shown::Rendered).unwrap();
+    picture.pixels.iter().map(|pixel| f64::from(pixel[0])).collect()
+}
+
+#[test]
+fn a_denoised_lightmap_has_less_noise_and_equal_light() {
+    let room = room();
+    if !crate::denoise::is_there(&room) {
+        return;
+    }
+    let fine = ["--spp", "64", "--gather-rays", "64", "--shadow-rays", "16", "--photons", "100000"];
+    for (name, options) in [("fine", &fine[..]), ("noisy", &[]), ("denoised", &["--denoise"])] {
+        let path = format!("{name}.glb");
+        let words = ["bake", "box.gltf", "--exr", "-o", &path];
+        let quick: Vec<&str> =
+            QUICK.chunks(2).filter(|pair| !options.contains(&pair[0])).flatten().copied().collect();
+        let outcome = room.run(&[&words[..], &quick, options].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    }
+    let [fine, noisy, denoised] =
+        ["fine", "noisy", "denoised"].map(|name| page(&room, &format!("{name}.0.exr")));
+    let lit = || (0..fine.len()).filter(|&index| fine[index] > 0.0);
+    let error = |values: &[f64]| lit().map(|index| (values[index] - fine[index]).powi(2)).sum::<f64>().sqrt();
+    let mean = |values: &[f64]| lit().map(|index| values[index]).sum::<f64>();
+    assert!(error(&denoised) < 0.8 * error(&noisy), "{} of {}", error(&denoised), error(&noisy));
+    assert!((mean(&denoised) / mean(&noisy) - 1.0).abs() < 0.02);
+    let part = bake(&room, &["--part", "1/2", "--denoise", "-o", "1.part"]);
+    assert!(part.status == Some(2) && part.stderr.contains("--denoise"), "{}", part.stderr);
 }
 
 #[test]

@@ -120,6 +120,23 @@ fn a_furnace_has_equal_light_at_all_texels_and_shows_its_radiance() {
 }
 
 #[test]
+fn a_ceiling_is_dark_behind_a_lamp() {
+    let triangles = [room([0; 6]), square(0.5, 0.95, false, 1).to_vec()].concat();
+    let materials = vec![lambertian("wall", 0.5), lit("lamp", 0.0, 10.0)];
+    let scene = scene(triangles, materials, camera(Vec3::ZERO, Vec3::NEG_Z));
+    let (plan, baked) = bake(&scene, 10.0, &fewer());
+    let light = |texel: &Texel| value(&baked.irradiance, texel).x;
+    let is_behind = |texel: &&Texel| {
+        let at = place(&plan, texel);
+        at.y > 0.99 && normal(&plan, texel).y < -0.5 && at.x.abs() < 0.3 && at.z.abs() < 0.3
+    };
+    let behind: Vec<f32> = plan.texels().iter().filter(is_behind).map(light).collect();
+    let floor = plan.texels().iter().filter(|texel| normal(&plan, texel).y > 0.5);
+    let brightest = floor.map(light).fold(0.0, f32::max);
+    assert!(behind.len() >= 25 && behind.iter().all(|light| *light < 0.02 * brightest), "{behind:?}");
+}
+
+#[test]
 fn a_box_on_a_floor_leaves_no_black_texel_and_no_light_below_it() {
     for double_sided in [false, true] {
         let solid = Material { double_sided, ..lambertian("box", 0.5) };

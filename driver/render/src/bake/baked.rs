@@ -22,6 +22,11 @@ pub struct Baked {
 impl Baked {
     /// Lightmaps from the irradiance of all sensors, in the order of [`Plan::points`].
     pub fn new(plan: &Plan, light: &[Light]) -> Self {
+        Self::of(plan, Self::irradiance(plan, light))
+    }
+
+    /// Pages of the irradiance of all sensors, in the order of [`Plan::points`], W/m^2.
+    pub fn irradiance(plan: &Plan, light: &[Light]) -> Vec<Page> {
         let mut light = light.iter();
         let irradiance = |texel: &Texel| {
             let own = light.by_ref().take(texel.samples.len());
@@ -29,7 +34,11 @@ impl Baked {
             (!texel.samples.is_empty()).then(|| (sum / texel.samples.len() as f64).as_vec3())
         };
         let measured: Vec<Option<Vec3>> = plan.texels().iter().map(irradiance).collect();
-        let irradiance = pages(plan.atlas(), plan.texels(), &measured);
+        pages(plan.atlas(), plan.texels(), &measured)
+    }
+
+    /// Lightmaps from pages of irradiance, which may be denoised.
+    pub fn of(plan: &Plan, irradiance: Vec<Page>) -> Self {
         let colours = colours(plan.surfaces(), plan.atlas(), plan.texels());
         let radiance = plan.texels().iter().zip(colours).map(|(texel, colour)| {
             let [x, y] = texel.place;

@@ -29,9 +29,10 @@ const MOVES: u32 = 2;
 pub(super) struct Solids<'p> {
     image: SceneImage,
     lines: Lines<'p>,
-    /// True for each material that is one-sided.
-    is_one_sided: Vec<bool>,
-    /// Sorted corners of the two-sided faces that bound closed surfaces.
+    /// True for each material that is one-sided and does not emit: its faces count as those of a solid. A
+    /// lamp may be a lone sheet.
+    is_of_solids: Vec<bool>,
+    /// Sorted corners of the other faces that bound closed surfaces.
     closed: HashSet<[[u32; 3]; 3]>,
     /// Length of a texel's side, metres.
     texel: f32,
@@ -41,9 +42,11 @@ impl<'p> Solids<'p> {
     /// Solids of a scene without instances, which is packed, for texels whose side has a length, metres.
     pub(super) fn new(scene: &Scene, packed: &'p PackedScene, texel: f32) -> Self {
         let (image, lines) = packed.view();
-        let is_one_sided: Vec<bool> = scene.materials.iter().map(|material| !material.double_sided).collect();
-        let closed = if is_one_sided.contains(&false) { closed_faces(scene) } else { HashSet::new() };
-        Self { image, lines, is_one_sided, closed, texel }
+        let materials = scene.materials.iter();
+        let is_of_solids: Vec<bool> =
+            materials.map(|material| !material.double_sided && !material.is_emissive()).collect();
+        let closed = if is_of_solids.contains(&false) { closed_faces(scene) } else { HashSet::new() };
+        Self { image, lines, is_of_solids, closed, texel }
     }
 
     /// Moves the samples of texels out of solids, and removes those that cannot be moved, or are hidden from
@@ -152,8 +155,8 @@ impl<'p> Solids<'p> {
     fn is_from_within(&self, hit: &Hit, direction: Vec3) -> bool {
         let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
         let is_back = (b - a).cross(c - a).dot(direction) > 0.0;
-        let is_one_sided = self.is_one_sided.get(hit.triangle.material as usize) == Some(&true);
-        is_back && (is_one_sided || self.closed.contains(&key([a, b, c])))
+        let is_of_solid = self.is_of_solids.get(hit.triangle.material as usize) == Some(&true);
+        is_back && (is_of_solid || self.closed.contains(&key([a, b, c])))
     }
 }
 
@@ -165,7 +168,7 @@ fn around(normal: Vec3) -> [Vec3; 8] {
     [u, p, v, -q, -u, -p, -v, q]
 }
 
-/// Two-sided faces of closed surfaces that do not surround the scene.
+/// Faces of closed surfaces that do not surround the scene.
 fn closed_faces(scene: &Scene) -> HashSet<[[u32; 3]; 3]> {
     let corners: Vec<[Vec3; 3]> = scene.triangles.iter().map(|triangle| triangle.vertices).collect();
     let of = |index: &u32| corners.get(*index as usize).copied().unwrap_or_default();
