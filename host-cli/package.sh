@@ -186,7 +186,7 @@ pack_wheel() {
 }
 
 pack_blender() {
-    python3 host-cli/blender/build.py "$files/bin/photoncard" "$packages" >/dev/null
+    python3 host-cli/blender/build.py "$files/bin/photoncard" "$packages" "$files"/LICENSE*-OF-* >/dev/null
 }
 
 pack_container() {
@@ -204,10 +204,11 @@ stage_files
 for format in "${formats[@]}"; do
     "pack_$format"
 done
-(cd "$packages" && sha256sum -- * >"$work/sums")
-mv "$work/sums" "$packages/SHA256SUMS"
 mkdir -p "$out"
 for file in "$packages"/*; do
     mv "$file" "$out/"
     echo "$out/${file##*/}"
 done
+# Also of packages of other formats that are there.
+(cd "$out" && find . -maxdepth 1 -type f ! -name SHA256SUMS -printf '%f\0' | sort -z | xargs -0 sha256sum -- >"$work/sums")
+mv "$work/sums" "$out/SHA256SUMS"

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes the zip of the Blender extension: `build.py BINARY OUT_DIR`.
+"""Makes the zip of the Blender extension: `build.py BINARY OUT_DIR [LICENCE ...]`.
 
 The zip has the program BINARY as `bin/photoncard`, for the platform that the program's header states.
-Equal inputs make equal bytes. Where the command `blender` is found, it validates the zip.
+Texts of licences of what the program contains are added. Equal inputs make equal bytes. Where the command `blender` is found, it validates the zip.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -57,10 +58,10 @@ def stripped(program: Path) -> bytes:
         return copy.read_bytes()
 
 
-def contents(program: bytes, platform: str) -> dict[str, bytes]:
+def contents(program: bytes, platform: str, licences: Sequence[Path] = ()) -> dict[str, bytes]:
     """Files of the zip by their names."""
     files = {path.relative_to(SOURCE).as_posix(): path.read_bytes() for path in SOURCE.rglob("*.py")}
-    files |= {path.name: path.read_bytes() for path in LICENSES}
+    files |= {path.name: path.read_bytes() for path in [*LICENSES, *licences]}
     manifest = (SOURCE / "blender_manifest.toml").read_text()
     files["blender_manifest.toml"] = with_platform(manifest, platform).encode()
     suffix = ".exe" if platform.startswith("windows") else ""
@@ -85,13 +86,13 @@ def write_zip(path: Path, files: dict[str, bytes]) -> None:
             archive.writestr(entry, files[name], compresslevel=9)
 
 
-def build(program: Path, folder: Path) -> Path:
+def build(program: Path, folder: Path, licences: Sequence[Path] = ()) -> Path:
     """Makes the zip and returns its path."""
     if not program.is_file():
         raise BuildError(f"there is no program {program}: build it by cargo build --release")
     code = stripped(program)
     platform = platform_of(code)
-    files = contents(code, platform)
+    files = contents(code, platform, licences)
     version = re.search(r'(?m)^version = "(.+)"$', files["blender_manifest.toml"].decode()).group(1)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"photoncard-blender-{version}-{platform}.zip"
@@ -112,11 +113,12 @@ def validate(path: Path) -> None:
 
 def main() -> int:
     """The script."""
-    if len(sys.argv) != 3:
-        print("usage: build.py BINARY OUT_DIR", file=sys.stderr)
+    if len(sys.argv) < 3:
+        print("usage: build.py BINARY OUT_DIR [LICENCE ...]", file=sys.stderr)
         return 2
     try:
-        path = build(Path(sys.argv[1]), Path(sys.argv[2]))
+        program, folder, *licences = map(Path, sys.argv[1:])
+        path = build(program, folder, licences)
         validate(path)
     except (BuildError, subprocess.CalledProcessError, OSError) as error:
         print(f"build.py: {error}", file=sys.stderr)

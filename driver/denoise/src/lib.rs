@@ -1,5 +1,5 @@
-//! Removes noise from pictures and lightmaps by Intel Open Image Denoise (Áfra 2019), neural networks of which
-//! that for pictures reads radiance, albedo and normals.
+//! Removes noise from pictures and lightmaps by Intel Open Image Denoise (Áfra 2019), neural networks of
+//! which that for pictures reads radiance, albedo and normals.
 //!
 //! The library is not part of this program. [`Denoiser::find`] loads version 2 of it at run time, from the
 //! first of these locations that has it:

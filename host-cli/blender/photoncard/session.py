@@ -1,4 +1,7 @@
-"""A session of `photoncard view`, of which pictures are shown while they are rendered. Knows nothing of Blender."""
+"""A session of `photoncard view`, of which pictures are shown while they are rendered.
+
+Knows nothing of Blender.
+"""
 
 from __future__ import annotations
 
@@ -31,10 +34,10 @@ class Camera:
     look_at: tuple[float, float, float]
     up: tuple[float, float, float]
     shift: tuple[float, float]
+    lens: tuple[float, float] = (0.0, 0.0)
+    """Diameter of the lens and distance in focus, metres; that of a pinhole is zeros."""
     fov: float | None = None
     height: float | None = None
-    name: str | None = None
-    """Camera of the scene whose lens this one has."""
 
     def message(self) -> dict[str, Any]:
         """The message that moves a view's camera there."""
@@ -45,28 +48,32 @@ class Camera:
 class Session:
     """A process of `photoncard view` and the connection to it.
 
-    Threads of its own start it and receive pictures; `changed` is called from them. Methods return at once.
+    Threads of its own start it and receive pictures; `changed` is called from them. All methods but `stop`
+    return at once. The process ends with this one.
     """
 
     def __init__(self, command: list[str], folder: str, changed: Callable[[], None]) -> None:
         """Starts the command, a `photoncard view`, in `folder`. Raises `OSError`."""
         self._changed = changed
         self._lock = threading.Lock()
+        self._sending = threading.Lock()
         self._socket: WebSocket | None = None
         self._wishes: dict[str, dict[str, Any]] = {}
         self._sent = 0
         self._received = 0
-        self._is_over = False
+        self._is_stopping = False
         self._picture: np.ndarray | None = None
         self._versions: np.ndarray | None = None
         self.state: dict[str, Any] = {}
         """The newest state of the view, as its protocol has it."""
         self.error = ""
         """Why there is no picture, or why a change was refused."""
+        self.is_lost = False
+        """True once nothing more arrives."""
         self._process = subprocess.Popen(
-            [*command, "--listen", "127.0.0.1:0", "--progress", "json"],
+            [*command, "--listen", "127.0.0.1:0", "--attached", "--progress", "json"],
             cwd=folder,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -79,7 +86,7 @@ class Session:
         return self._wish("camera", camera.message())
 
     def resize(self, width: int, height: int) -> int:
-        """Changes the size of the picture, within `MAX_SIDE` and `MAX_PIXELS`. Returns the number of the message."""
+        """Changes the size of the picture, within `MAX_SIDE` and `MAX_PIXELS`. Returns the message's number."""
         return self._wish("size", {"type": "size", "size": [width, height]})
 
     def reload(self) -> int:
@@ -87,12 +94,12 @@ class Session:
         return self._wish("reload", {"type": "reload"})
 
     def picture(self) -> np.ndarray | None:
-        """The picture as far as it is rendered: RGBA, linear, rows from the bottom; None before the first tile."""
+        """The picture so far: RGBA, linear, rows from the bottom; None before the first tile."""
         with self._lock:
             return None if self._picture is None else self._picture.copy()
 
     def newest(self) -> tuple[int, float]:
-        """Number of the newest message that the view has taken, and the share of its picture that is shown."""
+        """Number of the newest message that the view has taken, and the shown share of its picture."""
         with self._lock:
             version = self.state.get("version")
             shown = 0.0 if self._versions is None else float(np.mean(self._versions == version))
@@ -100,16 +107,18 @@ class Session:
 
     @property
     def is_over(self) -> bool:
-        """True once the process has ended."""
-        return self._process.poll() is not None
+        """True once the process has ended, or the connection to it."""
+        return self.is_lost or self._process.poll() is not None
 
     def stop(self) -> None:
         """Ends the process, and waits for it."""
-        with self._lock:
-            self._is_over = True
+        with self._sending:
+            self._is_stopping = True
             connection = self._socket
         if connection:
             connection.close()
+        if self._process.stdin:
+            self._process.stdin.close()
         if self._process.poll() is None:
             self._process.terminate()
             try:
@@ -120,14 +129,13 @@ class Session:
 
     def _wish(self, kind: str, message: dict[str, Any]) -> int:
         """Sends a message, or keeps it as the last of its kind until there is a connection."""
-        with self._lock:
+        with self._sending:
             self._sent += 1
             message = {**message, "id": self._sent}
-            connection = self._socket
-            if connection is None:
+            if self._socket is None:
                 self._wishes[kind] = message
-        if connection is not None:
-            self._send(connection, message)
+            else:
+                self._send(self._socket, message)
         return message["id"]
 
     def _send(self, connection: WebSocket, message: dict[str, Any]) -> None:
@@ -149,19 +157,20 @@ class Session:
                 self._begin(connection)
                 while (message := connection.receive()) is not None:
                     self._take(connection, message)
+                if not self._is_stopping:
+                    self._fail("The view has closed the connection.")
             except (WebSocketError, ValueError) as error:
                 self._fail(f"The view is lost: {error}.")
 
     def _begin(self, connection: WebSocket) -> None:
-        with self._lock:
-            if self._is_over:
+        with self._sending:
+            if self._is_stopping:
                 connection.close()
                 return
-            self._socket = connection
-            waiting = sorted(self._wishes.values(), key=lambda message: message["id"])
+            for message in sorted(self._wishes.values(), key=lambda message: message["id"]):
+                self._send(connection, message)
             self._wishes.clear()
-        for message in waiting:
-            self._send(connection, message)
+            self._socket = connection
 
     def _take(self, connection: WebSocket, message: str | bytes) -> None:
         if isinstance(message, bytes):
@@ -181,7 +190,7 @@ class Session:
         width, height = state["size"]
         with self._lock:
             self.state = state
-            self.error = state.get("refused") or ""
+            self.error = state.get("refused") or state.get("unread") or ""
             if self._picture is None or self._picture.shape[:2] != (height, width):
                 self._picture = np.zeros((height, width, 4), np.float32)
                 self._versions = np.zeros((height, width), np.uint32)
@@ -205,9 +214,9 @@ class Session:
         with self._process.stderr as stream:
             for line in stream:
                 event = events.parse(line.decode("utf-8", "replace"))
-                if isinstance(event, events.Failure) and not self._is_over:
+                if isinstance(event, events.Failure) and not self._is_stopping:
                     self._fail(str(event))
 
     def _fail(self, text: str) -> None:
-        self.error = text
+        self.error, self.is_lost = text, True
         self._changed()

@@ -14,8 +14,8 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from . import command
-from .baking import bake_world
-from .export.camera import Frame
+from .baking import BakeError, bake_world
+from .export.camera import Frame, lens_of
 from .export.objects import export
 from .properties import program_stated
 from .session import MAX_PIXELS, MAX_SIDE, Camera, Session
@@ -29,9 +29,13 @@ _SCENE = (
     bpy.types.Material,
     bpy.types.NodeTree,
     bpy.types.Object,
+    bpy.types.Scene,
     bpy.types.World,
 )
-"""Kinds of data of which a change may change the picture. Meshes and curves change with their objects."""
+"""Kinds of data of which a change may change the picture.
+
+Meshes and curves change with their objects, and the visibility of objects with the scene.
+"""
 
 
 class Viewport:
@@ -45,7 +49,8 @@ class Viewport:
         self._session: Session | None = None
         self._command: list[str] = []
         self._changed_at: float | None = time.monotonic() - _REST
-        self._worlds: dict[str, np.ndarray] = {}
+        self._worlds: dict[str, np.ndarray | BakeError] = {}
+        self._notices: list[str] = []
         self._camera: Camera | None = None
         self._size = (0, 0)
         self.error = ""
@@ -54,7 +59,7 @@ class Viewport:
     def update(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Notes changes of the scene."""
         updates = [update.id for update in depsgraph.updates]
-        if any(isinstance(changed, (bpy.types.World, bpy.types.ShaderNodeTree)) for changed in updates):
+        if any(_is_of_world(changed, depsgraph.scene.world) for changed in updates):
             self._worlds.clear()
         if any(isinstance(changed, _SCENE) and not _is_camera(changed) for changed in updates):
             self._changed_at = time.monotonic()
@@ -67,7 +72,7 @@ class Viewport:
         if session is None:
             return
         if session.is_over:
-            self.error = session.error or "photoncard has ended."
+            self.error = f"{session.error or 'photoncard has ended.'} A change of the scene starts it anew."
             return
         self.error = session.error
         if size != self._size:
@@ -86,7 +91,8 @@ class Viewport:
         state: dict[str, Any] = self._session.state if self._session else {}
         if not state:
             return "Starting"
-        return "Done" if state.get("settled") else f"Samples: {state.get('samples') or 0}"
+        shown = "Done" if state.get("settled") else f"Samples: {state.get('samples') or 0}"
+        return " | ".join([shown, *self._notices])
 
     def free(self) -> None:
         """Ends the session."""
@@ -114,6 +120,7 @@ class Viewport:
         scene = depsgraph.scene
         bake = self._bake if scene.photoncard.use_bake else None
         exported = export(depsgraph, scene.camera, Frame(1, 1, (0, 1, 0, 1)), bake, is_view=True)
+        self._notices = exported.notices.lines()
         arguments = exported.write(self._folder.name)
         wanted = self._view_command(arguments, scene)
         if self._session and not self._session.is_over and wanted == self._command:
@@ -146,8 +153,20 @@ class Viewport:
     def _bake(self, world: bpy.types.World) -> np.ndarray:
         """Bakes a world once, until it changes."""
         if world.name not in self._worlds:
-            self._worlds[world.name] = bake_world(world)
-        return self._worlds[world.name]
+            try:
+                self._worlds[world.name] = bake_world(world)
+            except BakeError as error:
+                self._worlds[world.name] = error
+        baked = self._worlds[world.name]
+        if isinstance(baked, BakeError):
+            raise baked
+        return baked
+
+
+def _is_of_world(changed: bpy.types.ID, world: bpy.types.World | None) -> bool:
+    if isinstance(changed, bpy.types.ShaderNodeTree) and changed.is_embedded_data:
+        return world is not None and changed.original == world.original.node_tree
+    return isinstance(changed, (bpy.types.Image, bpy.types.ShaderNodeTree, bpy.types.World))
 
 
 def _is_camera(changed: bpy.types.ID) -> bool:
@@ -161,12 +180,16 @@ def size_of(width: int, height: int) -> tuple[int, int]:
 
 
 def camera_of(
-    view: Matrix, projection: Matrix, size: tuple[int, int], behind: float, name: str | None = None
+    view: Matrix,
+    projection: Matrix,
+    size: tuple[int, int],
+    behind: float,
+    lens: tuple[float, float] | None = None,
 ) -> Camera:
     """Camera of a region's view and projection matrices.
 
     That of a parallel projection stands `behind` metres behind the region's, since Blender's shows what lies
-    behind itself. `name` is the camera of the scene whose lens it has.
+    behind itself. `lens` is the diameter and the distance in focus, metres; None is a pinhole.
     """
     world = view.inverted()
     position, forward, up = world.translation, -world.col[2].to_3d(), world.col[1].to_3d()
@@ -184,7 +207,7 @@ def camera_of(
         shift=shift,
         fov=None if is_parallel else math.degrees(2 * math.atan(1 / projection[1][1])),
         height=2 / projection[1][1] if is_parallel else None,
-        name=name,
+        lens=lens or (0.0, 0.0),
     )
 
 
@@ -196,6 +219,7 @@ def region_camera(context: bpy.types.Context) -> tuple[Camera, tuple[int, int]]:
     """Camera and size of the picture of the context's region."""
     region, shown, space = context.region, context.region_data, context.space_data
     size = size_of(region.width, region.height)
-    is_of_camera = shown.view_perspective == "CAMERA" and space.camera is not None
-    name = space.camera.name if is_of_camera and space.camera == context.scene.camera else None
-    return camera_of(shown.view_matrix, shown.window_matrix, size, space.clip_end / 2, name), size
+    ob = space.camera if shown.view_perspective == "CAMERA" else None
+    is_camera = ob is not None and ob.type == "CAMERA" and ob.data.type == "PERSP"
+    lens = lens_of(ob.evaluated_get(context.evaluated_depsgraph_get())) if is_camera else None
+    return camera_of(shown.view_matrix, shown.window_matrix, size, space.clip_end / 2, lens), size

@@ -91,7 +91,8 @@ class WebSocket:
         if status.split(" ")[1:2] != ["101"]:
             raise WebSocketError(f"{host} refuses the connection: {status}")
         accepted = base64.b64encode(hashlib.sha1((key + _GUID).encode()).digest()).decode()
-        values = {name.strip().lower(): value.strip() for name, _, value in (field.partition(":") for field in fields)}
+        pairs = (field.partition(":") for field in fields)
+        values = {name.strip().lower(): value.strip() for name, _, value in pairs}
         if values.get("sec-websocket-accept") != accepted:
             raise WebSocketError(f"{host} is no server of WebSockets")
 

@@ -272,7 +272,8 @@ class Viewports(unittest.TestCase):
             ob = bpy.context.scene.camera.evaluated_get(depsgraph)
             size = (48, 32)
             projection = ob.calc_matrix_camera(depsgraph, x=size[0], y=size[1])
-            camera = module.camera_of(ob.matrix_world.inverted(), projection, size, 0.0)
+            lens = module.lens_of(ob) if ob.data.type == "PERSP" else None
+            camera = module.camera_of(ob.matrix_world.inverted(), projection, size, 0.0, lens)
             viewport.follow(camera, size, depsgraph)
             self.assertEqual(viewport.error, "")
             picture = viewport.picture()
@@ -285,7 +286,6 @@ class Viewports(unittest.TestCase):
         module = importlib.import_module(f"{MODULE}.viewport")
         for make in (scenes.plan, scenes.product):
             scene = draft(make())
-            scene.camera.data.dof.use_dof = False
             scene.render.film_transparent = False
             scene.render.resolution_x, scene.render.resolution_y = 48, 32
             with tempfile.TemporaryDirectory() as folder:

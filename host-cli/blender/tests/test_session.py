@@ -22,7 +22,18 @@ from photoncard.session import Camera, Session  # noqa: E402
 
 SCENES = FOLDER.parent.parent / "scenes"
 PROGRAM = os.environ.get("PHOTONCARD", "")
-QUICK = ["--size", "24x24", "--quality", "paper", "--photons", "2000", "--gather-rays", "8", "--card", "emulated:1"]
+QUICK = [
+    "--size",
+    "24x24",
+    "--quality",
+    "paper",
+    "--photons",
+    "2000",
+    "--gather-rays",
+    "8",
+    "--card",
+    "emulated:1",
+]
 PATIENCE = 120
 """Seconds of a wait, long enough for a busy machine."""
 FRONT = Camera((0.0, 0.0, 2.8), (0.0, 0.0, 1.8), (0.0, 1.0, 0.0), (0.0, 0.0), fov=40.0)

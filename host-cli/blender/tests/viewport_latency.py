@@ -33,7 +33,9 @@ def main() -> None:
     scene = os.path.abspath(sys.argv[1])
     changed = threading.Event()
     with tempfile.TemporaryDirectory() as folder:
-        session = Session([os.environ["PHOTONCARD"], "view", scene, "--quality", "draft"], folder, changed.set)
+        session = Session(
+            [os.environ["PHOTONCARD"], "view", scene, "--quality", "draft"], folder, changed.set
+        )
         try:
             session.resize(width, height)
             wait(session, changed, lambda: bool(session.state.get("settled")))

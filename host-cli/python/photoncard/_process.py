@@ -27,9 +27,9 @@ class Progress(NamedTuple):
     phase: str
     done: int
     total: int
-    #: Seconds since the start of the work.
+    #: Seconds since the start of the phase.
     seconds: float
-    #: Estimated seconds until the end; None if there is no estimate.
+    #: Estimated seconds until the end of the phase; None if there is no estimate.
     seconds_left: Optional[float]
 
 

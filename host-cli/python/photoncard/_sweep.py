@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional
@@ -28,18 +27,20 @@ class Sweep:
         #: The folder of tables and plots.
         self.path = path
         self._kept = kept
+        self._read: dict[str, Table] = {}
 
     @property
     def tables(self) -> list[str]:
         """Names of the tables."""
         return sorted(path.stem for path in self.path.glob("*.csv"))
 
-    @functools.lru_cache(maxsize=None)
     def __getitem__(self, name: str) -> Table:
         """A table by its name: `points`, `structures` and, with `reuse=True`, `reuse`."""
         if name not in self.tables:
             raise Error(f"the sweep has no table {name!r}", f"there are {', '.join(self.tables)}")
-        return Table.of_csv((self.path / f"{name}.csv").read_text(encoding="utf-8"))
+        if name not in self._read:
+            self._read[name] = Table.of_csv((self.path / f"{name}.csv").read_text(encoding="utf-8"))
+        return self._read[name]
 
     @property
     def points(self) -> Table:

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use photoncard_driver::parts::Part;
 use photoncard_driver::render::RenderSettings;
 
@@ -53,10 +53,12 @@ pub(crate) struct MeasureOptions {
 
 #[derive(Args)]
 #[command(next_help_heading = "Points")]
+#[group(skip)]
+#[command(group = ArgGroup::new("places").args(["points", "grid"]).required(true))]
 pub(crate) struct PointOptions {
     /// Points to measure, a line each: x y z and the normal nx ny nz, as rtrace -I reads them; or CSV, whose
     /// first line may name columns; - for standard input
-    #[arg(long, value_name = "FILE", required_unless_present = "grid", conflicts_with = "grid")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) points: Option<PathBuf>,
     /// Points on a grid: above the upward faces of a node, by its name; or in a rectangle between two corners
     ///

@@ -69,7 +69,7 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     look_at: Option<[f64; 3]>,
     /// Direction that is up in the picture [default: +y with --look-at, else the camera's own]
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true, hide_short_help = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, hide_short_help = true)]
     up: Option<[f64; 3]>,
     /// Vertical field of view, degrees [default: the camera's own]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
@@ -261,10 +261,17 @@ fn panorama(text: &str) -> Result<[f32; 2], String> {
 }
 
 pub(super) fn place(text: &str) -> Result<[f64; 3], String> {
+    three_numbers(text).ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    three_numbers(text).ok_or_else(|| "a direction is X,Y,Z: three numbers, such as 0,1,0".into())
+}
+
+fn three_numbers(text: &str) -> Option<[f64; 3]> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
-    let place = place.filter(|place| place.iter().all(|number| number.is_finite()));
-    place.ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
+    let numbers = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite()))
 }
 
 #[cfg(test)]

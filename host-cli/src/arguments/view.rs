@@ -28,6 +28,9 @@ pub(crate) struct ViewOptions {
     /// Open the page in the browser of this machine
     #[arg(long, help_heading = "Page")]
     pub(crate) open: bool,
+    /// End the view when its standard input ends, such as that of a program that has started it
+    #[arg(long, help_heading = "Page", hide_short_help = true)]
+    pub(crate) attached: bool,
     /// Folder in which the page may save pictures; without this option it cannot save any
     #[arg(long, value_name = "DIR", help_heading = "Page")]
     pub(crate) out: Option<PathBuf>,

@@ -69,8 +69,9 @@ impl Grid<'_> {
     fn above_node(&self, scene: &Scene) -> Result<Vec<Point>, Failure> {
         if !scene.objects.iter().any(|name| name == self.place) {
             let names: Vec<&str> = scene.objects.iter().take(8).map(String::as_str).collect();
+            let more = if scene.objects.len() > names.len() { ", ..." } else { "" };
             let text = format!("the scene has no node {} with a mesh", self.place);
-            let help = format!("give one of its nodes ({}, ...), or two corners", names.join(", "));
+            let help = format!("give one of its nodes ({}{more}), or two corners", names.join(", "));
             return Err(refused(&text, &help));
         }
         let is_node = |triangle: &Triangle| {

@@ -50,6 +50,8 @@ struct Display {
     told: u64,
     /// Time of the last object.
     told_at: Option<Instant>,
+    /// True after the object that says that all is done.
+    is_end_told: bool,
 }
 
 /// Form of the progress on standard error.
@@ -86,6 +88,7 @@ impl Progress {
             form: Form::of_standard_error(),
             told: 0,
             told_at: None,
+            is_end_told: false,
         };
         let display = (!quiet).then_some(Mutex::new(display));
         let (stopped, kept) = (stop_on_signals()?, AtomicBool::new(false));
@@ -226,9 +229,11 @@ impl Display {
     /// Writes an object of the kind `progress`, unless the last one is recent.
     fn tell_json(&mut self, (phase, done, total): (Phase, u64, u64), seconds: f64, left: Option<f64>) {
         let is_recent = self.told_at.is_some_and(|told| told.elapsed() < JSON_INTERVAL);
-        if is_recent && done < total {
+        let is_end = done >= total;
+        if if is_end { self.is_end_told } else { is_recent } {
             return;
         }
+        self.is_end_told = is_end;
         self.told_at = Some(Instant::now());
         say_json(&json!({
             "kind": "progress",
@@ -243,7 +248,7 @@ impl Display {
     fn begin(&mut self, phase: Phase, total: u64) {
         self.bar.finish_and_clear();
         self.phase = Some(phase);
-        (self.told, self.told_at) = (0, None);
+        (self.told, self.told_at, self.is_end_told) = (0, None, false);
         self.remaining = match phase {
             Phase::Tiles => Remaining::new(self.cards, self.resumed),
             Phase::Pilot | Phase::Photons | Phase::Pack | Phase::Load | Phase::SelfTest => {

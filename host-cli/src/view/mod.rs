@@ -39,6 +39,7 @@ use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use miette::{MietteDiagnostic, Report};
@@ -80,6 +81,9 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     let folder = folder.transpose()?;
     let denoiser = denoiser(options.denoise)?;
     let is_over = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
+    if options.attached {
+        end_with_input(is_over.clone());
+    }
     let listener = listen(options.listen)?;
     let address = listener.local_addr().map_err(|error| Failure::work_error(&error))?;
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX);
@@ -164,6 +168,15 @@ fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
         let report = MietteDiagnostic::new(format!("cannot listen at {address}: {error}"));
         Failure::Work(Report::new(report.with_help(remedy)))
     })
+}
+
+/// Ends the view when standard input ends.
+fn end_with_input(is_over: Arc<AtomicBool>) {
+    // The thread is not joined: it ends with the process.
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        is_over.store(true, Ordering::Relaxed);
+    });
 }
 
 /// Random token of 128 bits, as 32 hexadecimal digits.

@@ -22,13 +22,14 @@ use super::state::{Task, with_remedy};
 use super::wish::Sketch;
 use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
+use crate::notices::{self, Uses};
 use crate::render::files::denoised_by;
 
 /// Renders the pictures that pages request, until the view is over.
 pub(super) struct Painter<'a> {
     hub: &'a Hub,
     options: &'a SceneOptions,
-    /// Memory of the smallest card, bytes.
+    /// Memory of the largest card, bytes.
     dram_bytes: u64,
     quality: Quality,
     finish: Finish,
@@ -95,11 +96,16 @@ impl<'a> Painter<'a> {
     /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them,
     /// pages are told, and the scene stays.
     fn reload(&mut self) {
-        let scene = match input::load_with_groups(self.options, self.dram_bytes) {
+        let picture = self.hub.change(|view, _| view.wish.settings.picture.clone());
+        let loaded = input::load_with_groups(self.options, self.dram_bytes).and_then(|scene| {
+            notices::say_ignored(self.options, &scene, &Uses::of(self.options, &picture, None))?;
+            Ok(scene)
+        });
+        let scene = match loaded {
             Ok(scene) => scene,
             Err(failure) => {
                 let text = format!("the scene is not read again: {}", failure.line());
-                return self.hub.change(|view, _| view.tell_error(&text));
+                return self.hub.change(|view, _| view.keep_scene(text));
             }
         };
         let parts = (Sketch::new(&scene), SceneFacts::new(input::name(self.options), &scene));
@@ -108,7 +114,7 @@ impl<'a> Painter<'a> {
                 self.fitting.take().into_iter().for_each(Fitting::stop);
                 (self.scene, self.assigned) = (Arc::new(scene), None);
             }
-            Err(error) => self.hub.change(|view, _| view.tell_error(&with_remedy(&error))),
+            Err(error) => self.hub.change(|view, _| view.keep_scene(with_remedy(&error))),
         }
     }
 

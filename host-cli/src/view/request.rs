@@ -60,6 +60,9 @@ pub(super) struct View {
     pub(super) up: Option<[f64; 3]>,
     /// Lens shift; `None` for that of the view so far.
     pub(super) shift: Option<[f32; 2]>,
+    /// Diameter of the lens and distance in focus, metres, of which 0 is a pinhole; `None` for the lens of
+    /// the view so far.
+    pub(super) lens: Option<[f32; 2]>,
     pub(super) shown: Extent,
 }
 
@@ -151,6 +154,7 @@ fn view(fields: &Fields) -> Result<View, String> {
         look_at: fields.place("look_at")?,
         up: if is_stated("up") { Some(fields.place("up")?) } else { None },
         shift: if is_stated("shift") { Some(fields.pair("shift")?) } else { None },
+        lens: if is_stated("lens") { Some(fields.lens()?) } else { None },
         shown,
     })
 }
@@ -257,6 +261,12 @@ impl Fields<'_> {
         numbers.ok_or_else(|| format!("{name:?} is a list of two numbers"))
     }
 
+    fn lens(&self) -> Result<[f32; 2], String> {
+        let lens = self.pair("lens")?;
+        let is_lens = lens == [0.0; 2] || lens.iter().all(|metres| (1e-6..=1e9).contains(metres));
+        if is_lens { Ok(lens) } else { Err("\"lens\" is diameter and focus in metres, or [0, 0]".into()) }
+    }
+
     fn pixel(&self, name: &str) -> Result<[u32; 2], String> {
         let list = self.field(name)?.as_array().filter(|list| list.len() == 2);
         let number =
@@ -286,7 +296,15 @@ mod tests {
 
     /// View of the tests' messages.
     fn view(camera: Option<String>, shown: Extent) -> View {
-        View { camera, position: [1.0, 2.5, -3.0], look_at: [0.0; 3], up: None, shift: None, shown }
+        View {
+            camera,
+            position: [1.0, 2.5, -3.0],
+            look_at: [0.0; 3],
+            up: None,
+            shift: None,
+            lens: None,
+            shown,
+        }
     }
 
     #[test]
@@ -305,11 +323,12 @@ mod tests {
                 Request::Camera { view: view(None, Extent::Angles([360.0, 180.0])), is_moving: false },
             ),
             (
-                r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"up":[0,0,-1],"shift":[0.1,-2],"fov":40,"moving":false}"#,
+                r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"up":[0,0,-1],"shift":[0.1,-2],"lens":[0.25,3],"fov":40,"moving":false}"#,
                 Request::Camera {
                     view: View {
                         up: Some([0.0, 0.0, -1.0]),
                         shift: Some([0.1, -2.0]),
+                        lens: Some([0.25, 3.0]),
                         ..view(None, Extent::Fov(40.0))
                     },
                     is_moving: false,
@@ -384,6 +403,7 @@ mod tests {
             (camera("[0,0,1]", "null"), "fov"),
             (camera("[0,0,1],\"up\":[0,1]", "40"), "up"),
             (camera("[0,0,1],\"shift\":0.5", "40"), "shift"),
+            (camera("[0,0,1],\"lens\":[0.5,0]", "40"), "lens"),
             (r#"{"type":"set","name":"a.b","value":1e39}"#.into(), "value"),
             (r#"{"type":"set","name":"a.b","value":[1,2]}"#.into(), "value"),
             (format!(r#"{{"type":"set","name":"{}","value":1}}"#, "a".repeat(2000)), "name"),

@@ -76,6 +76,8 @@ pub(super) struct View {
     pub(super) refinement: Refinement,
     /// True after a page has asked for the scene's files to be read again.
     pub(super) is_outdated: bool,
+    /// Reason why the scene's files could not be read again, since when the scene is an older one.
+    pub(super) unread: Option<String>,
     /// Request of the last complete final picture.
     pub(super) settled: Option<Wish>,
     /// Reason why the newest request cannot be rendered; `None` if it can.
@@ -115,6 +117,7 @@ impl View {
             wish,
             start,
             is_outdated: false,
+            unread: None,
             settled: None,
             refused: None,
             canvas: Canvas::default(),
@@ -166,22 +169,14 @@ impl View {
             wish.settings.picture.light_groups = light_groups.to_vec();
             wish
         };
-        let [first, edited] = [&self.start.wish, &self.wish].map(with_groups);
-        let scene_of_first = sketch.with(&first)?;
-        let (wish, scene) = match sketch.with(&edited) {
-            Ok(scene) => (edited, scene),
-            Err(_) => {
-                let wish = edited.without_edits();
-                let scene = sketch.with(&wish)?;
-                (wish, scene)
-            }
-        };
+        let [first, wish] = [&self.start.wish, &self.wish].map(|wish| with_groups(wish).for_scene(&sketch));
+        let [scene_of_first, scene] = [sketch.with(&first)?, sketch.with(&wish)?];
         if light_groups != self.wish.settings.picture.light_groups {
             self.set_gains([[1.0; 3]; MAX_LIGHT_GROUPS]);
         }
         (self.start.sketch, self.start.facts, self.start.wish) = (sketch, facts, first);
         (self.first, self.scene, self.wish) = (scene_of_first, scene, wish);
-        (self.refused, self.settled) = (None, None);
+        (self.refused, self.settled, self.unread) = (None, None, None);
         self.refinement.wish(true);
         self.refinement.fit_again(self.start.is_fitted(&self.wish));
         self.begin_picture();
@@ -224,6 +219,13 @@ impl View {
     pub(super) fn tell_error(&mut self, text: &str) {
         let message = json!({"type": "error", "text": with_flags(text)}).to_string();
         self.pages.values_mut().for_each(|page| page.reply(message.clone()));
+    }
+
+    /// Keeps the scene, whose files could not be read again, and tells pages the reason.
+    pub(super) fn keep_scene(&mut self, reason: String) {
+        self.tell_error(&reason);
+        self.unread = Some(with_flags(&reason));
+        self.revisions.state += 1;
     }
 
     /// Processes a message from a page.
@@ -471,6 +473,7 @@ impl View {
             "spp": settings.integrator.samples,
             "settled": has_all && self.refinement.is_settled(),
             "refused": self.refused,
+            "unread": self.unread,
             "version": self.refinement.version(),
             "id": self.message,
             "command": command_line::quoted(&self.command()),

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::quality::{Fit, Stated};
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings};
-use photoncard_driver::scene::{Environment, Scene, SceneContents};
+use photoncard_driver::scene::{Aperture, Environment, Scene, SceneContents};
 
 use super::request::{Extent, Setting, View};
 
@@ -50,21 +50,37 @@ impl Wish {
         &self.edits
     }
 
-    /// Copy of this request without the assignments of pages.
-    pub(super) fn without_edits(&self) -> Self {
-        Self { edits: Vec::new(), ..self.clone() }
+    /// Copy of this request for another scene: of the assignments of pages, with those that are possible
+    /// there, and with its first camera if it has none of the chosen name.
+    pub(super) fn for_scene(&self, sketch: &Sketch) -> Self {
+        let mut wish = Self { edits: Vec::new(), ..self.clone() };
+        let camera = &mut wish.settings.picture.camera;
+        camera.take_if(|name| !sketch.0.cameras.iter().any(|camera| camera.name == *name));
+        for edit in &self.edits {
+            wish.edits.push(edit.clone());
+            if sketch.with(&wish).is_err() {
+                wish.edits.pop();
+            }
+        }
+        wish
     }
 
     /// Sets position, target and projection of the camera, and whose lens and shift it has.
     pub(super) fn look(&mut self, view: View) {
-        let View { camera, position, look_at, up, shift, shown } = view;
+        let View { camera, position, look_at, up, shift, lens, shown } = view;
         let picture = &mut self.settings.picture;
-        (picture.camera_at, picture.look_at, picture.up) = (Some(position), Some(look_at), up);
+        (picture.camera_at, picture.look_at) = (Some(position), Some(look_at));
+        picture.up = up.or(picture.up);
         if camera.is_some() {
             // A chosen camera has its own lens and shift.
             (picture.camera, picture.aperture, picture.focus, picture.shift) = (camera, None, None, None);
         }
         picture.shift = shift.or(picture.shift);
+        if let Some([diameter, focus]) = lens {
+            let is_pinhole = diameter == 0.0;
+            picture.aperture = Some(Aperture::Diameter(diameter));
+            picture.focus = (!is_pinhole).then_some(focus);
+        }
         (picture.fov, picture.orthographic, picture.panorama) = match shown {
             Extent::Fov(degrees) => (Some(degrees), None, None),
             Extent::Height(metres) => (None, Some(metres), None),

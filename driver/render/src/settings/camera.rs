@@ -138,9 +138,11 @@ fn refused(field: &'static str, value: &impl ToString, reason: String, remedy: &
 /// # Errors
 /// If the directions are parallel, or `up` has no length.
 fn turned(forward: DVec3, up: [f64; 3]) -> Result<[DVec3; 3], RenderError> {
-    let right = DVec3::from(up).try_normalize().map(|up| forward.cross(up));
+    // Squares of very long and of very short vectors are not finite, or 0.
+    let scaled = DVec3::from(up) / DVec3::from(up).abs().max_element();
+    let right = scaled.try_normalize().map(|up| forward.cross(up));
     let right = right.filter(|right| right.length() >= VERTICAL).ok_or_else(|| {
-        let value = format!("{},{},{}", up[0], up[1], up[2]);
+        let value = up.map(|number| format!("{number:e}")).join(",");
         let reason = "it is no direction, or that in which the camera looks".to_owned();
         refused("picture.up", &value, reason, "give another direction, such as 0,1,0")
     })?;

@@ -3,11 +3,11 @@
 use gltf::json::Extras;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 
 #[derive(Deserialize)]
-#[serde(bound = "T: DeserializeOwned")]
-struct Keys<T> {
-    photoncard: Option<T>,
+struct Keys {
+    photoncard: Option<Map<String, Value>>,
 }
 
 /// Reads the value of the key `photoncard`; `None` if there is none.
@@ -20,9 +20,9 @@ pub(super) fn read<T: DeserializeOwned>(extras: &Extras) -> Result<Option<T>, St
     if !text.trim_start().starts_with('{') {
         return Ok(None);
     }
-    let keys: Keys<T> = serde_json::from_str(text).map_err(|error| {
-        // The message's line and column refer to `extras`, not to the file, and are cut off.
-        error.to_string().split(" at line ").next().unwrap_or_default().to_owned()
-    })?;
-    Ok(keys.photoncard)
+    // The message's line and column refer to `extras`, not to the file, and are cut off.
+    let reason =
+        |error: serde_json::Error| error.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+    let keys: Keys = serde_json::from_str(text).map_err(reason)?;
+    keys.photoncard.map(|values| serde_json::from_value(Value::Object(values)).map_err(reason)).transpose()
 }

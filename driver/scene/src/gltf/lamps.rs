@@ -135,6 +135,7 @@ impl Lamp<'_> {
         let object = scene.objects.len() as u32;
         scene.objects.push(self.name.to_owned());
         let is_mirror = world.determinant() < 0.0;
+        let before = scene.triangles.len();
         for corners in triangles {
             let [a, b, c] = corners.map(|corner| world.transform_point3(corner).as_vec3());
             let placed =
@@ -150,6 +151,10 @@ impl Lamp<'_> {
             }
             allocation::push(&mut scene.triangles, placed)
                 .map_err(|error| SceneError::memory(&document.path, "placing its lamps", error))?;
+        }
+        if scene.triangles.len() == before {
+            let reason = "the lamp is so small beside its distance from the origin that it has no area";
+            return Err(document.invalid(self.item, reason, "make it larger"));
         }
         Ok(())
     }

@@ -45,10 +45,11 @@ impl<'a> LightPlacer<'a> {
         self.units.are_converted()
     }
 
-    /// Adds the light `index`, which exists, with the transform of `node`.
+    /// Adds the light `index`, which exists, with the transform of `node`. With a photometric file
+    /// (`has_profile`) it stays a point, whatever its radius.
     pub(super) fn place(
         &self,
-        index: usize,
+        (index, has_profile): (usize, bool),
         node: usize,
         world: &DMat4,
         scene: &mut Scene,
@@ -70,7 +71,7 @@ impl<'a> LightPlacer<'a> {
         }
         let kind = self.kind(index, node, world)?;
         let radius = self.radius(index)?;
-        if radius > 0.0 && matches!(kind, PunctualKind::Point { .. }) {
+        if radius > 0.0 && !has_profile && matches!(kind, PunctualKind::Point { .. }) {
             let item = format!("{}.extras.photoncard.radius", place(index));
             return lamps::place_sphere(self.document, item, (&name, world), (intensity, radius), scene);
         }
@@ -177,6 +178,7 @@ pub(super) fn axes(world: &DMat4) -> Option<LightAxes> {
 
 /// Values of this renderer in a light's `extras`.
 #[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Stated {
     angle: Option<f32>,
     radius: Option<f32>,

@@ -189,8 +189,9 @@ impl<'a> Placer<'a> {
         let lights = scene.lights.len();
         let extensions = node.extensions.as_ref();
         if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {
-            self.lights.place(light.light.value(), index, &world, scene, notices)?;
-            // A spot light without an angle is left out.
+            let light = (light.light.value(), ies.is_some());
+            self.lights.place(light, index, &world, scene, notices)?;
+            // A spot light whose outer cone has no angle is left out.
             if let Some(uri) = ies.filter(|_| scene.lights.len() > lights) {
                 self.profiles.assign((&uri, index), lights, scene)?;
             }

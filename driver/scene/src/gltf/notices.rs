@@ -162,7 +162,7 @@ impl Notices {
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         let closed = "spot lights whose outer cone has no angle are left out";
         note(closed, "light", &self.closed_spots);
-        let points = "the radius of lights is ignored that are no point lights";
+        let points = "the radius of lights is ignored that are no point lights, or have a photometric file";
         note(points, "light", &self.lights_without_size);
         sentences
     }

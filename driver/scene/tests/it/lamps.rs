@@ -84,6 +84,19 @@ fn a_mesh_that_cameras_do_not_see_has_a_material_of_its_own() {
 }
 
 #[test]
+fn a_point_light_with_a_photometric_file_stays_a_point() {
+    let loaded = load_changed(|json| {
+        let extras = json!({"photoncard": {"radius": 0.5}});
+        let light = json!({"type": "point", "name": "bulb", "intensity": 7.0, "extras": extras});
+        json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+        json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+        let lit = json!({"KHR_lights_punctual": {"light": 0}});
+        add_node(json, json!({"extensions": lit, "extras": {"photoncard": {"ies": "data:,none"}}}));
+    });
+    assert!(loaded.unwrap_err().to_string().contains("line 1"), "the file is read");
+}
+
+#[test]
 fn damaged_lamps_are_refused_by_their_place() {
     let good = json!({"shape": "rectangle", "size": [1.0, 2.0], "radiance": [1.0, 1.0, 1.0]});
     for (key, value) in [
@@ -92,6 +105,7 @@ fn damaged_lamps_are_refused_by_their_place() {
         ("size", json!([1.0])),
         ("radiance", json!([-1.0, 0.0, 0.0])),
         ("radiance", json!([1e30, 0.0, 0.0])),
+        ("size", json!([1e-30, 1e-30])),
         ("power", json!(5.0)),
     ] {
         let mut light = good.clone();

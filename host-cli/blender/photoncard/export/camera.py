@@ -119,6 +119,18 @@ def _depth_of_field(
         notices.add("orthographic cameras are rendered without depth of field", ob.name)
         return
     dof = lens.dof
+    if dof.aperture_blades >= 3 or dof.aperture_ratio != 1:
+        notices.add("apertures are round", ob.name)
+    found = lens_of(ob)
+    if found is not None:
+        extras["aperture"], extras["focus"] = found
+
+
+def lens_of(ob: bpy.types.Object) -> tuple[float, float] | None:
+    """Diameter of a camera's lens and its distance in focus, metres; None for a pinhole."""
+    lens, dof = ob.data, ob.data.dof
+    if not dof.use_dof:
+        return None
     distance = dof.focus_distance
     if dof.focus_object:
         target = dof.focus_object.matrix_world
@@ -127,11 +139,8 @@ def _depth_of_field(
             target = target @ bone.matrix if bone else target
         view = ob.matrix_world.to_3x3().col[2].normalized()
         distance = abs((target.translation - ob.matrix_world.translation).dot(view))
-    if dof.aperture_blades >= 3 or dof.aperture_ratio != 1:
-        notices.add("apertures are round", ob.name)
-    if distance > 0:
-        extras["aperture"] = lens.lens * 1e-3 / dof.aperture_fstop
-        extras["focus"] = distance
+    diameter = lens.lens * 1e-3 / dof.aperture_fstop
+    return (diameter, distance) if distance > 0 and diameter > 0 else None
 
 
 def _panorama(lens: bpy.types.Camera, frame: Frame, camera: dict[str, Any], extras: dict[str, Any]) -> None:

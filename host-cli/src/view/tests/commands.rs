@@ -123,6 +123,7 @@ fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
                     look_at: place(1e-6),
                     up: None,
                     shift: None,
+                    lens: None,
                     shown,
                 });
             }
@@ -183,7 +184,8 @@ fn numbers_and_words_survive_a_shell() {
     let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
     let (position, look_at) = ([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0]);
     let (up, shift) = (Some([0.0, -1e-7, 1.0]), Some([0.1, -0.3]));
-    wish.look(View { camera: None, position, look_at, up, shift, shown: Extent::Fov(33.3) });
+    let lens = Some([0.25, 3.0]);
+    wish.look(View { camera: None, position, look_at, up, shift, lens, shown: Extent::Fov(33.3) });
     let line = quoted(&words(&view.scene, view.quality, view.finish(), &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");
     let shell = std::process::Command::new("sh").arg("-c").arg(format!("printf '%s\\n' {line}")).output();

@@ -187,7 +187,9 @@ fn a_scene_that_is_read_again_settles_to_the_picture_of_its_command() {
     let mut page = view.connect();
     page.settle();
     page.send(&json!({"type": "set", "name": "floor.diffuse", "value": [0.7, 0.2, 0.1]}));
-    page.wait("state", |state| state["settled"] == true && state["changes"] != json!([]));
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0.5}));
+    let is_edited = |state: &Value| state["changes"].as_array().is_some_and(|changes| changes.len() == 2);
+    page.wait("state", |state| state["settled"] == true && is_edited(state));
     let mut changed = scene();
     changed["materials"][0]["name"] = json!("ground");
     changed["nodes"][0]["scale"] = json!([1.0, 0.5, 2.0]);
@@ -196,10 +198,11 @@ fn a_scene_that_is_read_again_settles_to_the_picture_of_its_command() {
     let hello = page.wait_for("hello");
     assert_eq!(hello["scene"]["materials"][0]["name"], "ground");
     let state = page.settle();
-    assert_eq!(state["changes"], json!([]));
+    assert_eq!(state["changes"], json!([{"name": "lamp.emission", "value": 0.5}]));
     page.send(&json!({"type": "save", "name": "a.exr"}));
     page.wait_for("saved");
-    let plain = ["render", "scene.gltf", "--size", "20x12", "--quality", "draft", "-o", "a.exr"];
+    let mut plain = vec!["render", "scene.gltf", "--size", "20x12", "--quality", "draft", "-o", "a.exr"];
+    plain.extend(["--set", "lamp.emission=0.5"]);
     assert_eq!(room.run(&plain).status, Some(0));
     assert!(room.read("out/a.exr") == room.read("a.exr"), "{}", state["command"]);
 }
@@ -218,6 +221,54 @@ fn a_scene_that_cannot_be_read_again_stays() {
     let state =
         page.wait("state", |state| state["settled"] == true && state["camera"]["position"][0] == json!(0.2));
     assert_eq!(state["refused"], json!(null));
+    assert!(state["unread"].as_str().is_some_and(|reason| reason.contains("scene.gltf")), "{state}");
+    let mut other = scene();
+    other["cameras"][0]["name"] = json!("other");
+    room.write_scene("scene.gltf", &other);
+    page.send(&json!({"type": "reload"}));
+    page.wait_for("hello");
+    assert_eq!(page.settle()["unread"], json!(null));
+}
+
+/// The name of a camera that a page has chosen is dropped with the camera.
+#[test]
+fn a_scene_whose_chosen_camera_is_gone_is_seen_from_where_the_page_is() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    let mut there = camera(0.2, false);
+    there["name"] = json!("eye");
+    page.send(&there);
+    page.wait("state", |state| {
+        state["settled"] == true
+            && state["command"].as_str().is_some_and(|line| line.contains("--camera eye"))
+    });
+    let mut other = scene();
+    other["cameras"][0]["name"] = json!("other");
+    room.write_scene("scene.gltf", &other);
+    page.send(&json!({"type": "reload"}));
+    page.wait_for("hello");
+    let state = page.settle();
+    assert_eq!((&state["unread"], &state["camera"]["position"][0]), (&json!(null), &json!(0.2)));
+}
+
+/// A page states the lens, also that of a pinhole.
+#[test]
+fn a_page_states_the_lens() {
+    let room = Room::new();
+    let view = small_view(&room, &["--aperture", "0.5", "--focus", "1"]);
+    let mut page = view.connect();
+    let command = |page: &mut page::Page, lens: Value, said: &str| {
+        let mut message = camera(0.2, false);
+        message["lens"] = lens;
+        page.send(&message);
+        page.wait("state", |state| {
+            state["settled"] == true && state["command"].as_str().is_some_and(|line| line.contains(said))
+        });
+    };
+    command(&mut page, json!([0.25, 2.0]), "--aperture 0.25 --focus 2");
+    command(&mut page, json!([0, 0]), "--aperture 0");
 }
 
 #[test]
