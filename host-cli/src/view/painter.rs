@@ -105,7 +105,7 @@ impl<'a> Painter<'a> {
             Ok(scene) => scene,
             Err(failure) => {
                 let text = format!("the scene is not read again: {}", failure.line());
-                return self.hub.change(|view, _| view.keep_scene(text));
+                return self.hub.change(|view, _| view.keep_scene(&text));
             }
         };
         let parts = (Sketch::new(&scene), SceneFacts::new(input::name(self.options), &scene));
@@ -114,7 +114,7 @@ impl<'a> Painter<'a> {
                 self.fitting.take().into_iter().for_each(Fitting::stop);
                 (self.scene, self.assigned) = (Arc::new(scene), None);
             }
-            Err(error) => self.hub.change(|view, _| view.keep_scene(with_remedy(&error))),
+            Err(error) => self.hub.change(|view, _| view.keep_scene(&with_remedy(&error))),
         }
     }
 

@@ -222,9 +222,9 @@ impl View {
     }
 
     /// Keeps the scene, whose files could not be read again, and tells pages the reason.
-    pub(super) fn keep_scene(&mut self, reason: String) {
-        self.tell_error(&reason);
-        self.unread = Some(with_flags(&reason));
+    pub(super) fn keep_scene(&mut self, reason: &str) {
+        self.tell_error(reason);
+        self.unread = Some(with_flags(reason));
         self.revisions.state += 1;
     }
 
