@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The test command: prepares the machine, then checks format, lints, boards, tests, documentation and packages. Stages run alone by their
-# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so
+# names: tests/ci.sh [lint|boards|test|docs|packages|extensions ...]. A tool that is missing and cannot be installed is a failure or, where said so
 # and CI is not set, a loud skip: never a silent pass.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -267,10 +267,11 @@ test_blender() {
     tail -3 "$1/said"
 }
 
-check_packages() {
+# Packages of a release, the package of Python and the extension of Blender: ten minutes, a stage by its name alone.
+check_extensions() {
     step "packages of a release"
-    local program=${CARGO_TARGET_DIR:-target}/debug/photoncard dist
-    cargo build -p photoncard --features photoncard/study --locked
+    local program=${CARGO_TARGET_DIR:-target}/release/photoncard dist
+    cargo build --release -p photoncard --features photoncard/study --locked
     dist=$(mktemp -d)
     host-cli/package.sh --check --binary "$(realpath "$program")" --out "$dist"
     step "package of Python"
@@ -278,7 +279,9 @@ check_packages() {
     step "extension of Blender"
     test_blender "$dist" "$(realpath "$program")"
     rm -r "$dist"
+}
 
+check_packages() {
     step "packages of crates"
     tests/publishable.sh || {
         [ $? = 75 ] || fail "the crates cannot be packed"
@@ -303,7 +306,7 @@ check_packages() {
 
 [ $# != 0 ] || set -- lint boards test docs packages
 for stage in "$@"; do
-    declare -F "check_$stage" >/dev/null || fail "there is no stage $stage; the stages are lint, boards, test, docs, packages"
+    declare -F "check_$stage" >/dev/null || fail "there is no stage $stage; the stages are lint, boards, test, docs, packages, extensions"
 done
 # A board's image is linked as a whole by one thread: lints take the other, in another folder of cargo's.
 if [ "$1 ${2:-}" = "lint boards" ]; then

@@ -131,6 +131,11 @@ class Renders(unittest.TestCase):
 
 
 class Interrupts(unittest.TestCase):
+    def setUp(self):
+        # A process that a shell has started in the background ignores interrupts.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
+
     def interrupted(self, whole_group):
         with program(WAITING) as path:
             child = subprocess.Popen(
