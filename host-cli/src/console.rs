@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::failure::Failure;
 use crate::flags::with_flags;
 
-/// Whether standard error takes JSON objects in place of lines of text.
+/// Form of messages on standard error: true for JSON objects, false for lines of text.
 static IS_JSON: AtomicBool = AtomicBool::new(false);
 
 /// Makes all later messages on standard error JSON objects, one a line (`docs/cli.md`).

@@ -52,11 +52,11 @@ pub struct Ray {
     pub direction: Vec3,
     /// Maximum distance from the origin, metres.
     pub max_distance: f32,
-    /// What the ray is cast for.
+    /// Purpose of the ray.
     pub kind: RayKind,
 }
 
-/// What a ray is cast for. Some surfaces are there for some kinds of rays alone
+/// Purpose of a ray. Some surfaces exist for rays of some kinds only
 /// ([`HIDDEN`](photoncard_shared::layout::HIDDEN), [`LAMP`](photoncard_shared::layout::LAMP)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayKind {

@@ -102,6 +102,17 @@ def render_command(program: str, scene: list[str], settings: Settings, output: s
     return [program, "render", *scene, *settings.arguments(), *reports, "-o", output]
 
 
+def end_process(process: subprocess.Popen[bytes]) -> None:
+    """Asks a process to stop, ends it if it does not, and waits for it."""
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
 class Run:
     """A run of the command, whose tiles and events are read while it works."""
 
@@ -158,13 +169,7 @@ class Run:
 
     def stop(self) -> None:
         """Asks the process to stop, ends it if it does not, and waits for it."""
-        if self._process.poll() is None:
-            self._process.terminate()
-            try:
-                self._process.wait(_PATIENCE)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+        end_process(self._process)
         end = time.monotonic() + _PATIENCE
         for reader in self._readers:
             reader.join(max(end - time.monotonic(), 0))

@@ -17,11 +17,10 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from . import events
+from .command import end_process
 from .websocket import WebSocket, WebSocketError
 
 _TILE = struct.Struct("<11I")
-_PATIENCE = 5.0
-"""Seconds from the request to stop until the process is ended."""
 MAX_SIDE, MAX_PIXELS = 4096, 1 << 22
 """Greatest side and greatest number of pixels of a view's picture."""
 
@@ -119,13 +118,7 @@ class Session:
             connection.close()
         if self._process.stdin:
             self._process.stdin.close()
-        if self._process.poll() is None:
-            self._process.terminate()
-            try:
-                self._process.wait(_PATIENCE)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+        end_process(self._process)
 
     def _wish(self, kind: str, message: dict[str, Any]) -> int:
         """Sends a message, or keeps it as the last of its kind until there is a connection."""

@@ -40,7 +40,7 @@ fn bake(scene: &Scene, density: f64, settings: &RenderSettings) -> (Plan, Baked)
     let mut meter = Meter::new(scene, settings, [0.0; 3]);
     let readings = meter.measure(0, &plan.points(), &Unobserved).unwrap_or_else(|error| panic!("{error}"));
     let light: Vec<[f64; 3]> = readings.iter().map(Reading::irradiance).collect();
-    let baked = Baked::new(&plan, &light);
+    let baked = Baked::of(&plan, Baked::irradiance(&plan, &light));
     (plan, baked)
 }
 

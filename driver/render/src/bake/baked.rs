@@ -20,11 +20,6 @@ pub struct Baked {
 }
 
 impl Baked {
-    /// Lightmaps from the irradiance of all sensors, in the order of [`Plan::points`].
-    pub fn new(plan: &Plan, light: &[Light]) -> Self {
-        Self::of(plan, Self::irradiance(plan, light))
-    }
-
     /// Pages of the irradiance of all sensors, in the order of [`Plan::points`], W/m^2.
     pub fn irradiance(plan: &Plan, light: &[Light]) -> Vec<Page> {
         let mut light = light.iter();

@@ -32,7 +32,7 @@ pub struct Surfaces {
 impl Surfaces {
     /// Collects the surfaces of a scene. Objects of the names `objects` take lightmaps, all if there are no
     /// names, except for glass and for metals without emission, whose light is not that of a diffuse surface.
-    /// What cameras do not see is left out.
+    /// Surfaces that cameras do not see are left out.
     ///
     /// # Errors
     /// If a name is unknown, or nothing takes a lightmap.

@@ -22,7 +22,7 @@ pub(super) struct AreaLight {
     size: [f32; 2],
     /// Emitted radiance, W/(sr m^2).
     radiance: [f32; 3],
-    /// Whether the rays of pixels meet it.
+    /// True if eye rays meet the light.
     #[serde(default)]
     camera: bool,
 }

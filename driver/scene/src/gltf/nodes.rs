@@ -97,7 +97,7 @@ struct Extras {
     ies: Option<String>,
     /// Area light of the node.
     area_light: Option<AreaLight>,
-    /// Whether the rays of pixels meet the node's mesh; true if it is not stated.
+    /// Visibility of the node's mesh to eye rays; `None` for true.
     camera: Option<bool>,
 }
 
