@@ -12,7 +12,6 @@
 mod attributes;
 mod dwa;
 pub mod mix;
-mod plain;
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -23,11 +22,10 @@ use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Compression, Encoding, FlatSamples, Image, ImageAttributes,
     IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels, ReadLayers, SampleType,
-    SmallVec, Text, Vec2, WritableImage, f16, read as reader,
+    SmallVec, SpecificChannels, Text, Vec2, WritableImage, f16, read as reader,
 };
 use thiserror::Error;
 
-pub use self::plain::square_bytes;
 use crate::allocation::{self, OutOfMemory};
 use crate::choice::choices;
 use crate::cryptomatte::{self, Identities, Matte};
@@ -225,6 +223,25 @@ pub fn bytes(
     attributes::sort(&mut bytes, |name| name == PROVENANCE || name.starts_with(cryptomatte::PREFIX));
     intact::seal_exr(&mut bytes);
     Ok(bytes)
+}
+
+/// Encodes a square picture of `size * size` pixels as `OpenEXR`, float samples. `pixels` are rows from the
+/// top; those that are missing are black. Equal pixels give equal bytes. `path` is the file's name in errors.
+///
+/// # Errors
+/// If the encoder refuses the picture.
+pub fn square_bytes(path: &Path, size: u32, pixels: &[[f32; 3]]) -> Result<Vec<u8>, ExrError> {
+    let side = size as usize;
+    let at = |Vec2(x, y): Vec2<usize>| {
+        let [red, green, blue] = pixels.get(y * side + x).copied().unwrap_or_default();
+        (red, green, blue)
+    };
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_LOSSLESS };
+    let layer = Layer::new((side, side), LayerAttributes::default(), encoding, SpecificChannels::rgb(at));
+    let mut bytes = Cursor::new(Vec::new());
+    let written = Image::from_layer(layer).write().to_buffered(&mut bytes);
+    written.map_err(|error| ExrError::Encode { path: path.to_owned(), reason: error.to_string() })?;
+    Ok(bytes.into_inner())
 }
 
 fn image_of(
