@@ -14,9 +14,10 @@ use rustix::event::PollFlags;
 use super::LinkError;
 #[cfg(unix)]
 use super::pty::Pty;
+use super::remote_address::{host_name, tcp_address};
+use super::socket::tcp_port;
 #[cfg(unix)]
 use super::socket::unix_port;
-use super::socket::{host_name, tcp_address, tcp_port};
 use super::stream::wait_for;
 
 /// Address to listen on, an argument of `--listen`.
