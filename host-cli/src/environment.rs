@@ -1,7 +1,8 @@
 //! Value of the option `--environment`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use photoncard_driver::scene::{BRIGHTEST, Environment};
 
@@ -14,6 +15,15 @@ pub(crate) enum EnvironmentOption {
     Constant([f32; 3]),
     /// Path of an environment map.
     File(PathBuf),
+    /// Environment map that a page has sent.
+    Dropped(Arc<DroppedFile>),
+}
+
+/// File from a page. It is in no folder.
+#[derive(Debug, PartialEq)]
+pub(crate) struct DroppedFile {
+    pub(crate) name: String,
+    pub(crate) bytes: Vec<u8>,
 }
 
 impl FromStr for EnvironmentOption {
@@ -39,7 +49,15 @@ impl EnvironmentOption {
         match self {
             Self::Constant(radiance) => Ok((Environment::constant((*radiance).into()), None)),
             Self::File(path) => Environment::load_with_notice(path).map_err(Failure::input),
+            Self::Dropped(file) => {
+                Environment::of_bytes(Path::new(&file.name), &file.bytes).map_err(Failure::input)
+            }
         }
+    }
+
+    /// Returns whether this is a map, which can be turned.
+    pub(crate) fn is_map(&self) -> bool {
+        !matches!(self, Self::Constant(_))
     }
 
     /// Text for the provenance of a picture: `R,G,B`, or the file name of the map.
@@ -47,6 +65,7 @@ impl EnvironmentOption {
         match self {
             Self::Constant([red, green, blue]) => format!("{red},{green},{blue}"),
             Self::File(path) => path.file_name().map_or(String::new(), |name| name.to_string_lossy().into()),
+            Self::Dropped(file) => file.name.clone(),
         }
     }
 }

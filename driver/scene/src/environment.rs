@@ -66,11 +66,18 @@ impl Environment {
             let error = io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file");
             return Err(unreadable(error));
         }
-        let bytes = fs::read(path).map_err(unreadable)?;
+        Self::of_bytes(path, &fs::read(path).map_err(unreadable)?)
+    }
+
+    /// Decodes the bytes of a file, as [`Self::load_with_notice`] does; `path` is its name in errors.
+    ///
+    /// # Errors
+    /// [`SceneError::Environment`].
+    pub fn of_bytes(path: &Path, bytes: &[u8]) -> Result<(Self, Option<String>), SceneError> {
         let read = if bytes.starts_with(EXR_MAGIC) {
-            read_exr(path, &bytes)
+            read_exr(path, bytes)
         } else if bytes.starts_with(radiance::MAGIC) {
-            walled(|| radiance::read(&bytes)).map(|(size, texels)| Self::of(size, texels))
+            walled(|| radiance::read(bytes)).map(|(size, texels)| Self::of(size, texels))
         } else {
             Err(Fault::unreadable(
                 "it is neither a Radiance picture nor an OpenEXR picture",

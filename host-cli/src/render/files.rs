@@ -15,7 +15,7 @@ use photoncard_driver::output;
 use photoncard_driver::partial::PartialError;
 use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
-use photoncard_driver::tone_mapping::{ToneMapping, png_bytes, write_png};
+use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
 use serde_json::Value;
 
 use super::{part, video};
@@ -226,6 +226,28 @@ impl Form {
     }
 }
 
+/// Encodes an EXR or a PNG with its provenance. `path` is the file's name in errors.
+pub(crate) fn picture_bytes(
+    path: &Path,
+    format: PictureFormat,
+    film: &Film,
+    provenance: &str,
+    form: &Form,
+) -> Result<Vec<u8>, Failure> {
+    if format == PictureFormat::Exr {
+        let bytes = exr::bytes(path, &form.content(film), provenance, form.sample_type);
+        return bytes.map_err(|error| Failure::work_error(&error));
+    }
+    let size = [film.window().width(), film.window().height()];
+    let denoised = form.denoised.as_deref();
+    let radiance = film.pixels().enumerate().map(|(index, pixel)| {
+        denoised.and_then(|denoised| denoised.get(index)).copied().unwrap_or(pixel.radiance)
+    });
+    let alpha = form.is_transparent.then(|| film.all().map(|pixel| pixel.alpha).collect::<Vec<_>>());
+    let bytes = png_bytes(path, size, radiance, alpha.as_deref(), form.tone, Some(provenance));
+    bytes.map_err(|error| Failure::work_error(&error))
+}
+
 /// Writes a picture with its provenance. If it fails, an existing file stays unchanged.
 pub(crate) fn write_picture(
     picture: &PictureOutput,
@@ -235,22 +257,12 @@ pub(crate) fn write_picture(
 ) -> Result<(), Failure> {
     let PictureOutput { path, format } = picture;
     match format {
-        PictureFormat::Exr => exr::write(path, &form.content(film), provenance, form.sample_type)
-            .map_err(|error| Failure::work_error(&error)),
-        PictureFormat::Png => {
-            let size = [film.window().width(), film.window().height()];
-            let denoised = form.denoised.as_deref();
-            let radiance = film.pixels().enumerate().map(|(index, pixel)| {
-                denoised.and_then(|denoised| denoised.get(index)).copied().unwrap_or(pixel.radiance)
-            });
-            let alpha = form.is_transparent.then(|| film.all().map(|pixel| pixel.alpha).collect::<Vec<_>>());
-            let alpha = alpha.as_deref();
-            if picture.file().is_none() {
-                let bytes = png_bytes(path, size, radiance, alpha, form.tone, Some(provenance));
-                return write_bytes(&bytes.map_err(|error| Failure::work_error(&error))?);
+        PictureFormat::Exr | PictureFormat::Png => {
+            let bytes = picture_bytes(path, *format, film, provenance, form)?;
+            match picture.file() {
+                None => write_bytes(&bytes),
+                Some(path) => output::write(path, &bytes).map_err(|error| Failure::work_error(&error)),
             }
-            write_png(path, size, radiance, alpha, form.tone, Some(provenance))
-                .map_err(|error| Failure::work_error(&error))
         }
         PictureFormat::Video => Err(video::needless()),
         PictureFormat::Part => {

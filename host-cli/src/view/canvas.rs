@@ -8,7 +8,7 @@ use std::collections::{HashMap, VecDeque};
 use std::iter;
 use std::sync::Arc;
 
-use photoncard_driver::film::FilmPixel;
+use photoncard_driver::film::{Film, FilmPixel, Window};
 use photoncard_driver::layer::Layer;
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::budget::MAX_LIGHT_GROUPS;
@@ -21,6 +21,8 @@ pub(super) type Gains = [[f32; 3]; MAX_LIGHT_GROUPS];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Shown {
     Radiance,
+    /// Radiance as it is rendered, also of tiles that are denoised.
+    Rendered,
     /// Radiance whose light groups are mixed with these gains.
     Mix(Gains),
     Layer(Layer),
@@ -36,7 +38,7 @@ impl Shown {
     /// Name of the quantity in messages.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Self::Radiance | Self::Mix(_) => "radiance",
+            Self::Radiance | Self::Rendered | Self::Mix(_) => "radiance",
             Self::Layer(layer) => layer.name(),
         }
     }
@@ -44,7 +46,7 @@ impl Shown {
     /// Returns whether this is a layer that chips render only on request, such as `direct`.
     pub(super) fn is_of_chip(self) -> bool {
         match self {
-            Self::Radiance | Self::Mix(_) => false,
+            Self::Radiance | Self::Rendered | Self::Mix(_) => false,
             Self::Layer(layer) => layer.is_of_chip(),
         }
     }
@@ -176,10 +178,29 @@ impl Patch {
     }
 }
 
+/// Film of a picture of `width` x `height` pixels from all tiles of one pass; `None` if tiles are missing. A
+/// pixel of a coarse pass fills its square.
+pub(super) fn film_of(patches: &[Arc<Patch>], [width, height]: [u32; 2]) -> Option<Film> {
+    let format = *patches.first()?.tile.format();
+    let mut film = Film::new(width, height, Window::full(width, height), format).ok()?;
+    for patch in patches {
+        let step = patch.origin.step;
+        for ((column, row), sums) in patch.tile.sums() {
+            let [columns, rows] =
+                [(column, width), (row, height)].map(|(at, side)| at * step..side.min((at + 1) * step));
+            let square = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+            for (x, y) in square {
+                film.write(x, y, &sums).ok()?;
+            }
+        }
+    }
+    film.is_complete().then_some(film)
+}
+
 /// Returns three values of a pixel for a page. The value of a layer with one channel is repeated.
 fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     let layer = match shown {
-        Shown::Radiance => return pixel.pixel.radiance,
+        Shown::Radiance | Shown::Rendered => return pixel.pixel.radiance,
         Shown::Mix(gains) => return mixed(pixel, &gains),
         Shown::Layer(layer) => layer,
     };
@@ -271,6 +292,12 @@ impl Canvas {
         }
     }
 
+    /// Tiles of the pass `origin`.
+    pub(super) fn of_pass(&self, origin: Origin) -> Vec<Arc<Patch>> {
+        let of_pass = self.patches.iter().filter(|(_, patch)| patch.origin == origin);
+        of_pass.map(|(_, patch)| patch.clone()).collect()
+    }
+
     /// Oldest tile with a number of `from` or more, and its number.
     pub(super) fn after(&self, from: u64) -> Option<(u64, Arc<Patch>)> {
         let index = self.patches.partition_point(|(number, _)| *number < from);
@@ -330,6 +357,27 @@ mod tests {
     }
 
     #[test]
+    fn a_pixel_of_a_coarse_pass_fills_its_square_of_a_film() {
+        let mut canvas = Canvas::default();
+        for x in 0..3 {
+            let tile = Tile { id: x, x, y: 0, width: 1, height: 1 };
+            let mut pixel = FilmPixel::default();
+            pixel.pixel.radiance = [x as f32; 3];
+            let tile = FinishedTile::of_pixels(tile, [SumFormat::ONE.sums(&pixel)], SumFormat::ONE).unwrap();
+            let origin = Origin { version: 1, is_coarse: true, step: 2, samples: 1 };
+            canvas.put(Patch::new(origin, 0, tile, TileWork::default()));
+        }
+        let origin = canvas.after(0).unwrap().1.origin;
+        let patches = canvas.of_pass(origin);
+        let film = film_of(&patches, [5, 2]).unwrap();
+        let row = [0.0, 0.0, 1.0, 1.0, 2.0];
+        let shown: Vec<f32> = film.pixels().map(|pixel| pixel.radiance[0]).collect();
+        assert_eq!(shown, [row, row].concat());
+        assert!(film_of(&patches[1..], [5, 2]).is_none(), "a tile is missing");
+        assert!(canvas.of_pass(Origin { step: 4, ..origin }).is_empty());
+    }
+
+    #[test]
     fn denoised_tiles_are_sent_again_with_their_work_and_layers() {
         let mut canvas = Canvas::default();
         (0..2).for_each(|x| canvas.put(patch(4, x, 7)));
@@ -344,6 +392,7 @@ mod tests {
         };
         assert_eq!(sent(3, Shown::Radiance), (3, 7, vec![0.0, 2.0, 5.0]));
         assert_eq!(sent(4, Shown::Radiance), (4, 7, vec![1.0, 2.0, 5.0]));
+        assert_eq!(sent(4, Shown::Rendered), (4, 7, vec![0.0; 3]));
         assert_eq!(sent(4, Shown::Layer(Layer::Albedo)), (4, 7, vec![0.0; 3]));
         assert_eq!(sent(0, Shown::Radiance), (2, 9 + 7, vec![0.0; 3]));
     }

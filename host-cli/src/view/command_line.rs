@@ -90,6 +90,7 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
         environment.as_ref().map(|environment| match environment {
             EnvironmentOption::Constant(radiance) => numbers(radiance),
             EnvironmentOption::File(file) => path(&file.to_string_lossy()),
+            EnvironmentOption::Dropped(file) => path(&file.name),
         }),
     );
     words.add_some("environment-rotation", *environment_rotation);

@@ -10,6 +10,8 @@ use serde_json::{Map, Value, json};
 
 use super::canvas::{Gains, Shown};
 use super::wish::Wish;
+use crate::arguments::SceneOptions;
+use crate::environment::EnvironmentOption;
 
 /// Name and bounding box of a scene, for the first message to a page.
 pub(super) struct SceneFacts {
@@ -132,6 +134,19 @@ pub(super) fn changes(wish: &Wish) -> Value {
         _ => json!({"name": name, "value": value}),
     };
     wish.edits().iter().map(change).collect()
+}
+
+/// Environment map by its name, its rotation in degrees, and whether a page has sent it, as part of a message
+/// to pages; null for a scene without a map.
+pub(super) fn environment(options: &SceneOptions) -> Value {
+    let map = options.environment.as_ref().filter(|map| map.is_map());
+    map.map_or(Value::Null, |map| {
+        json!({
+            "name": map.name(),
+            "rotation": options.environment_rotation.unwrap_or_default(),
+            "dropped": matches!(map, EnvironmentOption::Dropped(_)),
+        })
+    })
 }
 
 /// Gains of the light groups by name, as part of a message to pages.

@@ -6,21 +6,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use photoncard_driver::cryptomatte::Identities;
 use photoncard_driver::exr::mix::{Gain, Mix, MixError};
 use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
+use photoncard_driver::output;
 use photoncard_driver::render::{NamedSettings, Rendering};
-use photoncard_driver::tone_mapping::{ToneMapping, write_png};
+use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
 use serde_json::json;
 
 use super::canvas::Gains;
-use super::pages::Outgoing;
+use super::pages::{Outgoing, file_message};
 use super::request::Saving;
-use super::saving::Folder;
-use super::state::{Effect, PageNumber, Task, View};
-use crate::arguments::{PictureFormat, PictureOutput};
+use super::saving::{Folder, format_of, unsettled_name};
+use super::state::{Effect, PageNumber, Task, Unsettled, View};
+use super::wish::Wish;
+use crate::arguments::PictureFormat;
 use crate::console::printable_json;
-use crate::render::files::{Form, write_picture};
+use crate::failure::Failure;
+use crate::render::files::{Form, picture_bytes};
 
 /// Final picture of a request, equal to that of `photoncard render`. Pages can save it.
 pub(super) struct Settled {
@@ -28,7 +32,7 @@ pub(super) struct Settled {
     pub(super) rendering: Rendering,
     /// Denoised radiance, if the view denoises.
     pub(super) denoised: Option<Vec<[f32; 3]>>,
-    pub(super) wish: super::wish::Wish,
+    pub(super) wish: Wish,
     /// Provenance of the pixels, with the names of the input files.
     pub(super) provenance: NamedSettings,
 }
@@ -131,34 +135,76 @@ impl Hub {
             Effect::Nothing => true,
             Effect::Close => false,
             Effect::Save(saving) => {
-                let message = match self.save(&saving) {
-                    Ok(path) => json!({"type": "saved", "path": path.display().to_string()}),
-                    Err(text) => json!({"type": "error", "text": text}),
-                };
-                self.change(|view, _| view.reply(page, &message));
+                match self.save(&saving) {
+                    Ok(Saved::File(path)) => {
+                        let message = json!({"type": "saved", "path": path.display().to_string()});
+                        self.change(|view, _| view.reply(page, &message));
+                    }
+                    Ok(Saved::Message(message)) => self.change(|view, _| view.send_file(page, message)),
+                    Err(text) => {
+                        let message = json!({"type": "error", "text": text});
+                        self.change(|view, _| view.reply(page, &message));
+                    }
+                }
                 true
             }
         }
     }
 
-    /// Saves the final picture of the newest request.
-    fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
-        let (version, gains) = {
+    /// Processes bytes of a file from a page. Returns whether its connection stays open.
+    pub(super) fn receive_bytes(&self, page: PageNumber, bytes: &[u8]) -> bool {
+        self.change(|view, _| view.receive_bytes(page, bytes))
+    }
+
+    /// Saves the picture of the newest request: the final one, or the last whole one on the way to it, whose
+    /// name says so.
+    fn save(&self, saving: &Saving) -> Result<Saved, String> {
+        let (version, look, unsettled) = {
             let view = self.lock();
-            (view.version(), view.gains())
+            let look = Look { tone: saving.tone, gains: view.gains(), is_denoised: view.denoises() };
+            (view.version(), look, view.unsettled())
         };
         let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let settled = settled.filter(|settled| settled.version == version);
-        let settled = settled.ok_or("the picture is not settled yet: save it when it is")?;
+        match settled.filter(|settled| settled.version == version) {
+            Some(settled) => {
+                let Settled { rendering, denoised, wish, provenance, .. } = &*settled;
+                let identities = rendering.identities.clone();
+                let denoised = denoised.clone().filter(|_| look.is_denoised);
+                let film = &rendering.film;
+                self.put(
+                    saving,
+                    &saving.name,
+                    &Subject { film, identities, denoised, wish, provenance },
+                    &look,
+                )
+            }
+            None => {
+                let unsettled =
+                    unsettled.ok_or("there is no whole picture yet: save it when there is one")?;
+                let film = unsettled.film().ok_or("a tile of the picture is missing: save it again")?;
+                let Unsettled { wish, provenance, .. } = &unsettled;
+                let subject = Subject { film: &film, identities: None, denoised: None, wish, provenance };
+                self.put(saving, &unsettled_name(&saving.name), &subject, &look)
+            }
+        }
+    }
+
+    /// Writes a picture to the folder, or makes a message of it.
+    fn put(&self, saving: &Saving, name: &str, subject: &Subject, look: &Look) -> Result<Saved, String> {
+        if saving.is_download {
+            let bytes = encoded(Path::new(name), format_of(name)?, subject, look)?;
+            return Ok(Saved::Message(file_message(name, &bytes)));
+        }
         let mut folder = self.folder.lock().unwrap_or_else(PoisonError::into_inner);
         if self.is_over() {
             return Err("the view is over".into());
         }
         let folder = folder.as_mut().ok_or("pictures are saved only by a view with --out DIR")?;
-        folder.save(&saving.name, |path, format| {
-            let look = Look { tone: saving.tone, gains };
-            write(path, format, &settled, &look)
-        })
+        let write = |path: &Path, format| {
+            let bytes = encoded(path, format, subject, look)?;
+            output::write(path, &bytes).map_err(|error| Failure::work_error(&error).line())
+        };
+        folder.save(name, write).map(Saved::File)
     }
 
     /// Waits until no picture is being written. Once the view is over, no further picture can be saved.
@@ -199,44 +245,56 @@ impl Hub {
     }
 }
 
+/// Saved picture.
+enum Saved {
+    File(PathBuf),
+    /// Message to the page, which offers the file as a download.
+    Message(Vec<u8>),
+}
+
 /// Appearance of a picture on the page that saves it.
 struct Look {
     tone: ToneMapping,
     gains: Option<Gains>,
+    is_denoised: bool,
 }
 
-/// Writes a final picture as `photoncard render` would and, with gains, as `photoncard mix` does with its
-/// EXR.
-fn write(path: &Path, format: PictureFormat, settled: &Settled, look: &Look) -> Result<(), String> {
-    let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
+/// Picture to save.
+struct Subject<'a> {
+    film: &'a Film,
+    identities: Option<Arc<Identities>>,
+    denoised: Option<Vec<[f32; 3]>>,
+    wish: &'a Wish,
+    provenance: &'a NamedSettings,
+}
+
+/// Encodes a picture as `photoncard render` would and, with gains, as `photoncard mix` does with its EXR.
+fn encoded(path: &Path, format: PictureFormat, subject: &Subject, look: &Look) -> Result<Vec<u8>, String> {
+    let Subject { film, identities, denoised, wish, provenance } = subject;
+    let provenance = serde_json::to_string(provenance).map_err(|error| error.to_string())?;
     let provenance = printable_json(&provenance);
-    let layers = settled.wish.settings.picture.layers.clone();
-    let denoised = settled.denoised.clone();
-    let is_transparent = settled.wish.settings.picture.transparent;
-    let identities = settled.rendering.identities.clone();
-    let (sample_type, tone) = (SampleFormat::Float, look.tone);
+    let picture = &wish.settings.picture;
     let form = Form {
-        layers,
-        is_transparent,
-        identities,
+        layers: picture.layers.clone(),
+        is_transparent: picture.transparent,
+        identities: identities.clone(),
         illuminance: None,
-        sample_type,
-        tone,
-        denoised,
+        sample_type: SampleFormat::Float,
+        tone: look.tone,
+        denoised: denoised.clone(),
         part: None,
     };
-    let film = &settled.rendering.film;
     let Some(gains) = look.gains else {
-        let picture = PictureOutput { path: path.to_owned(), format };
-        return write_picture(&picture, film, &provenance, &form).map_err(|failure| failure.line());
+        let bytes = picture_bytes(path, format, film, &provenance, &form);
+        return bytes.map_err(|failure| failure.line());
     };
     let mix = mixed(path, film, (&provenance, &form), &gains).map_err(|error| error.to_string())?;
     match format {
-        PictureFormat::Exr => mix.write(path).map_err(|error| error.to_string()),
+        PictureFormat::Exr => mix.bytes().map_err(|error| error.to_string()),
         _ => {
             let (alpha, provenance) = (mix.alpha(), mix.provenance());
             let radiance = mix.radiance().into_iter();
-            write_png(path, mix.size(), radiance, alpha.as_deref(), tone, provenance.as_deref())
+            png_bytes(path, mix.size(), radiance, alpha.as_deref(), look.tone, provenance.as_deref())
                 .map_err(|error| error.to_string())
         }
     }

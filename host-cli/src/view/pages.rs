@@ -23,6 +23,16 @@ pub(super) enum Outgoing {
     Cards,
     /// Tile, and the quantity in it that the page shows.
     Tile(Arc<Patch>, Shown),
+    /// Picture that the page has asked for, as a message.
+    File(Vec<u8>),
+}
+
+/// First word of a file's message, where that of a tile has the number of a request.
+const FILE: u32 = u32::MAX;
+
+/// Message with a file: little-endian words [`FILE`] and the length of the name, then name and contents.
+pub(super) fn file_message(name: &str, contents: &[u8]) -> Vec<u8> {
+    [&FILE.to_le_bytes()[..], &(name.len() as u32).to_le_bytes(), name.as_bytes(), contents].concat()
 }
 
 /// Numbers of changes so far: of the view's state, and of the states of the cards.
@@ -36,6 +46,8 @@ pub(super) struct Revisions {
 #[derive(Debug)]
 pub(super) struct Page {
     replies: VecDeque<String>,
+    /// File that waits to be sent, as a message.
+    file: Option<Vec<u8>>,
     seen: Revisions,
     /// Number of the request in the last state message that was sent. The state message of a request states
     /// the picture's size, and therefore precedes the request's tiles.
@@ -43,9 +55,9 @@ pub(super) struct Page {
     shown: Shown,
     /// Number of the next tile to send, in the [`Canvas`].
     next: u64,
-    /// Total size of the tiles sent, bytes.
+    /// Total size of the tiles and files sent, bytes.
     sent: u64,
-    /// Total size of the tiles that the page has acknowledged, bytes.
+    /// Total size of the tiles and files that the page has acknowledged, bytes.
     received: u64,
 }
 
@@ -53,6 +65,7 @@ impl Page {
     pub(super) fn new() -> Self {
         Self {
             replies: VecDeque::new(),
+            file: None,
             seen: Revisions::default(),
             told: 0,
             shown: Shown::Radiance,
@@ -69,13 +82,23 @@ impl Page {
         self.replies.push_back(text);
     }
 
+    /// Returns whether a file waits to be sent.
+    pub(super) fn has_file(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Queues the message of a file.
+    pub(super) fn send_file(&mut self, message: Vec<u8>) {
+        self.file = Some(message);
+    }
+
     /// Sets what the page shows: radiance or a layer. All tiles are sent to it again.
     pub(super) fn show(&mut self, shown: Shown) {
         (self.shown, self.next) = (shown, 0);
     }
 
     /// Sends all tiles to the page again, if it shows radiance.
-    pub(super) fn mix_again(&mut self) {
+    pub(super) fn show_again(&mut self) {
         if self.shown == Shown::Radiance {
             self.next = 0;
         }
@@ -86,7 +109,7 @@ impl Page {
         self.shown.is_of_chip()
     }
 
-    /// Records the total size of the tiles that the page has received, bytes.
+    /// Records the total size of the tiles and files that the page has received, bytes.
     pub(super) fn acknowledge(&mut self, bytes: u64) {
         // A page cannot have received what was not sent.
         self.received = self.received.max(bytes.min(self.sent));
@@ -103,6 +126,10 @@ impl Page {
     ) -> Option<Outgoing> {
         if let Some(text) = self.replies.pop_front() {
             return Some(Outgoing::Reply(text));
+        }
+        if let Some(message) = self.file.take() {
+            self.sent += message.len() as u64;
+            return Some(Outgoing::File(message));
         }
         if self.seen.cards != newest.cards {
             self.seen.cards = newest.cards;

@@ -28,7 +28,8 @@ use crate::render::files::denoised_by;
 /// Renders the pictures that pages request, until the view is over.
 pub(super) struct Painter<'a> {
     hub: &'a Hub,
-    options: &'a SceneOptions,
+    /// Options with which the scene was read.
+    options: SceneOptions,
     /// Memory of the largest card, bytes.
     dram_bytes: u64,
     quality: Quality,
@@ -55,7 +56,7 @@ impl<'a> Painter<'a> {
         let ViewOptions { scene: scene_options, quality, threads, .. } = options;
         Self {
             hub,
-            options: scene_options,
+            options: scene_options.clone(),
             dram_bytes,
             quality: *quality,
             finish: options.finish(),
@@ -96,9 +97,10 @@ impl<'a> Painter<'a> {
     /// Reads the scene's files again. If they cannot be read, or the picture cannot be rendered of them,
     /// pages are told, and the scene stays.
     fn reload(&mut self) {
-        let picture = self.hub.change(|view, _| view.wish.settings.picture.clone());
-        let loaded = input::load_with_groups(self.options, self.dram_bytes).and_then(|scene| {
-            notices::say_ignored(self.options, &scene, &Uses::of(self.options, &picture, None))?;
+        let (picture, options) =
+            self.hub.change(|view, _| (view.wish.settings.picture.clone(), view.options.clone()));
+        let loaded = input::load_with_groups(&options, self.dram_bytes).and_then(|scene| {
+            notices::say_ignored(&options, &scene, &Uses::of(&options, &picture, None))?;
             Ok(scene)
         });
         let scene = match loaded {
@@ -108,11 +110,11 @@ impl<'a> Painter<'a> {
                 return self.hub.change(|view, _| view.keep_scene(&text));
             }
         };
-        let parts = (Sketch::new(&scene), SceneFacts::new(input::name(self.options), &scene));
-        match self.hub.change(|view, _| view.replace(parts, scene.light_groups.names())) {
+        let parts = (Sketch::new(&scene), SceneFacts::new(input::name(&options), &scene));
+        match self.hub.change(|view, _| view.replace(parts, &options, scene.light_groups.names())) {
             Ok(()) => {
                 self.fitting.take().into_iter().for_each(Fitting::stop);
-                (self.scene, self.assigned) = (Arc::new(scene), None);
+                (self.scene, self.assigned, self.options) = (Arc::new(scene), None, options);
             }
             Err(error) => self.hub.change(|view, _| view.keep_scene(&with_remedy(&error))),
         }

@@ -84,7 +84,7 @@ impl View {
         now: Duration,
     ) {
         if let Some(statistics) = statistics {
-            self.cost.add(statistics);
+            self.note_pass(statistics);
         }
         self.refinement.finish(outcome, now);
         if outcome == Outcome::Done && task.work.pass == Pass::Full {
@@ -114,9 +114,15 @@ impl View {
 
     /// Records that a picture is complete with fewer samples than it will have.
     pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
-        self.cost.add(statistics);
+        self.note_pass(statistics);
         self.keep(origin);
         self.revisions.state += 1;
+    }
+
+    /// Records cost and provenance of a complete pass.
+    fn note_pass(&mut self, statistics: &Statistics) {
+        self.cost.add(statistics);
+        self.provenance.clone_from(&statistics.provenance.pixels);
     }
 
     /// Drops all tiles but those of the complete pass `origin`, if it is a pass of the newest request.

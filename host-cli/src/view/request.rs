@@ -16,6 +16,10 @@ pub(super) const MAX_PIXELS: u64 = 1 << 22;
 const MAX_PLACE: f64 = 1e15;
 /// Maximum absolute exposure, stops (powers of two).
 const MAX_STOPS: f64 = 120.0;
+/// Maximum turn of an environment map, degrees.
+const MAX_TURN: f64 = 360.0;
+/// Maximum length of an environment map that a page sends, bytes.
+const MAX_DROPPED: u64 = 64 << 20;
 /// Maximum length of a text, bytes.
 const MAX_NAME: usize = 1024;
 
@@ -39,14 +43,28 @@ pub(super) enum Request {
     Reset,
     /// Read the scene's files again.
     Reload,
+    /// Turn the environment map, degrees.
+    Turn(f32),
+    /// Take the environment map whose bytes follow in binary messages.
+    Drop(Announced),
     Layer(Shown),
     Size([u32; 2]),
     Cursor(Option<[u32; 2]>),
     Pick([u32; 2]),
+    /// Show and save denoised radiance, or radiance as it is rendered.
+    Denoise(bool),
     Save(Saving),
     /// Total size of the tiles that the page has received since it connected, bytes.
     Shown(u64),
     Steer,
+}
+
+/// File that a page is going to send.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Announced {
+    pub(super) name: String,
+    /// Length of the file, bytes.
+    pub(super) length: usize,
 }
 
 /// Camera of a page.
@@ -83,6 +101,8 @@ pub(super) struct Saving {
     pub(super) name: String,
     /// Tone mapping for a PNG.
     pub(super) tone: ToneMapping,
+    /// True if the page is sent the file, false if the view writes it to its folder.
+    pub(super) is_download: bool,
 }
 
 /// Setting of the render that a page can change.
@@ -127,12 +147,19 @@ fn request(fields: &Fields) -> Result<Request, Fault> {
         "setting" => Request::Setting(setting(fields)?),
         "reset" => Request::Reset,
         "reload" => Request::Reload,
+        "turn" => Request::Turn(fields.number("degrees", -MAX_TURN, MAX_TURN)? as f32),
+        "drop" => Request::Drop(announced(fields)?),
         "layer" => Request::Layer(layer(&fields.text("name")?)?),
         "size" => Request::Size(fields.size()?),
         "cursor" if fields.0.get("at") == Some(&Value::Null) => Request::Cursor(None),
         "cursor" => Request::Cursor(Some(fields.pixel("at")?)),
         "pick" => Request::Pick(fields.pixel("at")?),
-        "save" => Request::Save(Saving { name: fields.text("name")?, tone: fields.tone()? }),
+        "denoise" => Request::Denoise(fields.switch("value")?),
+        "save" => Request::Save(Saving {
+            name: fields.text("name")?,
+            tone: fields.tone()?,
+            is_download: fields.0.contains_key("download") && fields.switch("download")?,
+        }),
         "shown" => Request::Shown(fields.whole("bytes", u64::MAX)?),
         "steer" => Request::Steer,
         other => return Err(Fault::Refused(format!("there is no message of the type {other:?}"))),
@@ -172,6 +199,21 @@ fn gain(fields: &Fields) -> Result<[f32; 3], String> {
     } else {
         Err("\"value\" is a factor of 0 or more, or three".into())
     }
+}
+
+/// File that a page announces: an environment map with a plain name.
+fn announced(fields: &Fields) -> Result<Announced, String> {
+    let name = fields.text("name")?;
+    let is_plain =
+        !name.starts_with(['.', '-']) && !name.contains(|c: char| c.is_control() || "/\\:".contains(c));
+    let lower = name.to_lowercase();
+    if !is_plain || ![".hdr", ".exr"].iter().any(|suffix| lower.ends_with(suffix)) {
+        return Err("an environment map is a file .hdr or .exr with a plain name".into());
+    }
+    let length = fields.whole("bytes", MAX_DROPPED).map_err(|_| {
+        format!("an environment map that is dropped has at most {} MB: use --environment", MAX_DROPPED >> 20)
+    })?;
+    Ok(Announced { name, length: length as usize })
 }
 
 fn layer(name: &str) -> Result<Shown, String> {
@@ -356,7 +398,13 @@ mod tests {
             (r#"{"type":"size","size":[640,480]}"#, Request::Size([640, 480])),
             (r#"{"type":"cursor","at":null}"#, Request::Cursor(None)),
             (r#"{"type":"pick","at":[3,4]}"#, Request::Pick([3, 4])),
+            (r#"{"type":"denoise","value":false}"#, Request::Denoise(false)),
             (r#"{"type":"reload"}"#, Request::Reload),
+            (r#"{"type":"turn","degrees":-30}"#, Request::Turn(-30.0)),
+            (
+                r#"{"type":"drop","name":"a sky.HDR","bytes":77}"#,
+                Request::Drop(Announced { name: "a sky.HDR".into(), length: 77 }),
+            ),
             (r#"{"type":"shown","version":3,"bytes":77}"#, Request::Shown(77)),
         ] {
             assert_eq!(parse(text), (Ok(request), None), "{text}");
@@ -365,14 +413,15 @@ mod tests {
 
     #[test]
     fn a_picture_is_saved_as_it_is_shown() {
-        let saved = |exposure, curve| {
+        let saved = |exposure, curve, is_download| {
             let tone = ToneMapping { exposure, curve };
-            (Ok(Request::Save(Saving { name: "a.png".into(), tone })), Some(7))
+            (Ok(Request::Save(Saving { name: "a.png".into(), tone, is_download })), Some(7))
         };
         for (more, saving) in [
-            ("", saved(None, ToneCurve::Reinhard)),
-            (r#","exposure":null,"tonemap":"none""#, saved(None, ToneCurve::None)),
-            (r#","exposure":-1.5,"tonemap":"aces""#, saved(Some(-1.5), ToneCurve::Aces)),
+            ("", saved(None, ToneCurve::Reinhard, false)),
+            (r#","exposure":null,"tonemap":"none""#, saved(None, ToneCurve::None, false)),
+            (r#","exposure":-1.5,"tonemap":"aces""#, saved(Some(-1.5), ToneCurve::Aces, false)),
+            (r#","download":true"#, saved(None, ToneCurve::Reinhard, true)),
         ] {
             assert_eq!(parse(&format!(r#"{{"type":"save","id":7,"name":"a.png"{more}}}"#)), saving, "{more}");
         }
@@ -419,6 +468,12 @@ mod tests {
             (r#"{"type":"pick","at":[-1,0]}"#.into(), "at"),
             (r#"{"type":"pick","at":[4096,0]}"#.into(), "at"),
             (r#"{"type":"shown","bytes":-3}"#.into(), "bytes"),
+            (r#"{"type":"denoise","value":1}"#.into(), "value"),
+            (r#"{"type":"turn","degrees":400}"#.into(), "degrees"),
+            (r#"{"type":"drop","name":"../sky.hdr","bytes":77}"#.into(), "plain"),
+            (r#"{"type":"drop","name":"sky.png","bytes":77}"#.into(), ".hdr"),
+            (r#"{"type":"drop","name":"sky.hdr","bytes":1e9}"#.into(), "64 MB"),
+            (r#"{"type":"save","name":"a.png","download":"yes"}"#.into(), "download"),
             (r#"{"type":"save","name":"a.png","exposure":1e9}"#.into(), "exposure"),
             (r#"{"type":"save","name":"a.png","tonemap":"best"}"#.into(), "best"),
         ] {

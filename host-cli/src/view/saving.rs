@@ -84,10 +84,18 @@ impl Folder {
     }
 }
 
+/// Name of a picture that is not settled: `a-unsettled.exr` for `a.exr`.
+pub(super) fn unsettled_name(name: &str) -> String {
+    match name.rsplit_once('.') {
+        Some((stem, suffix)) => format!("{stem}-unsettled.{suffix}"),
+        None => format!("{name}-unsettled"),
+    }
+}
+
 /// Returns the format that the suffix of a picture's name states. The name must be plain: ASCII letters,
 /// digits, spaces and `_-.` alone, with a letter, a digit or `_` at the beginning, and no name of a device on
 /// Windows.
-fn format_of(name: &str) -> Result<PictureFormat, String> {
+pub(super) fn format_of(name: &str) -> Result<PictureFormat, String> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-. ".contains(&byte);
     let begins_plainly =
         name.bytes().next().is_some_and(|first| first.is_ascii_alphanumeric() || first == b'_');
@@ -124,6 +132,12 @@ mod tests {
         for name in ["picture.exr", "A view 2.PNG", "picture.exr"] {
             assert_eq!(folder.save(name, write), Ok(folder.path().join(name)));
         }
+    }
+
+    #[test]
+    fn a_picture_that_is_not_settled_says_so_in_its_name() {
+        assert_eq!(unsettled_name("a.b.png"), "a.b-unsettled.png");
+        assert!(format_of(&unsettled_name("png")).is_err());
     }
 
     #[test]

@@ -57,7 +57,7 @@ fn read(pipe: Pipe, page: PageNumber, hub: &Hub) -> Result<(), Error> {
     while !hub.is_over() {
         let stays = match socket.read()? {
             Message::Text(text) => hub.receive(page, &text),
-            Message::Binary(_) => false,
+            Message::Binary(bytes) => hub.receive_bytes(page, &bytes),
             _ => true,
         };
         if !stays {
@@ -76,6 +76,7 @@ fn write(pipe: Pipe, page: PageNumber, hub: &Hub, is_open: &AtomicBool) -> Resul
             None => Message::Ping(tungstenite::Bytes::new()),
             Some(Ok(text)) => Message::text(text),
             Some(Err(Outgoing::Tile(patch, shown))) => Message::binary(patch.message(shown)),
+            Some(Err(Outgoing::File(message))) => Message::binary(message),
             Some(Err(_)) => continue,
         })?;
     }

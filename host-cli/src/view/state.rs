@@ -2,24 +2,28 @@
 //! Threads, clock, input and output are in [`super::hub`].
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
+use photoncard_driver::film::Film;
 use photoncard_driver::quality::{Finish, Quality};
-use photoncard_driver::render::{RenderError, RenderSettings};
+use photoncard_driver::render::{NamedSettings, RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
 use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use serde_json::{Value, json};
 
-use super::canvas::{Canvas, Gains, Origin, Shown};
+use super::canvas::{Canvas, Gains, Origin, Patch, Shown, film_of};
 use super::cards::CardBoard;
 use super::command_line;
 use super::describe::{self, Cost, SceneFacts};
 use super::pages::{Outgoing, Page, Revisions};
 use super::refinement::{COARSEST, Refinement, Work};
-use super::request::{Fault, Request, Saving, parse};
+use super::request::{Announced, Fault, Request, Saving, parse};
 use super::wish::{Sketch, Wish};
 use crate::arguments::SceneOptions;
+use crate::environment::{DroppedFile, EnvironmentOption};
 use crate::flags::with_flags;
+use crate::input;
 
 /// Identifier of a connected page.
 pub(super) type PageNumber = u64;
@@ -54,11 +58,32 @@ pub(super) struct Task {
     pub(super) origin: Origin,
 }
 
+/// Whole picture of the newest request that is not its final one.
+pub(super) struct Unsettled {
+    patches: Vec<Arc<Patch>>,
+    pub(super) wish: Wish,
+    /// Provenance of the pixels, which says that they are not those of the final picture.
+    pub(super) provenance: NamedSettings,
+    /// Position of the scene's origin in the file's coordinates.
+    origin: [f64; 3],
+}
+
+impl Unsettled {
+    /// Film of the picture, with a pixel for each of the final one.
+    pub(super) fn film(&self) -> Option<Film> {
+        let picture = &self.wish.settings.picture;
+        let mut film = film_of(&self.patches, [picture.width, picture.height])?;
+        film.set_origin(self.origin);
+        film.set_light_groups(&picture.light_groups);
+        Some(film)
+    }
+}
+
 /// Action for the caller after a message from a page.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,
-    /// Save the final picture.
+    /// Save the picture.
     Save(Saving),
     /// Close the connection.
     Close,
@@ -76,6 +101,10 @@ pub(super) struct View {
     pub(super) refinement: Refinement,
     /// True after a page has asked for the scene's files to be read again.
     pub(super) is_outdated: bool,
+    /// Options with which they are to be read. `start` has those of the present scene.
+    pub(super) options: SceneOptions,
+    /// Environment map that a page is sending, and the bytes so far.
+    upload: Option<(PageNumber, Announced, Vec<u8>)>,
     /// Reason why the scene's files could not be read again, since when the scene is an older one.
     pub(super) unread: Option<String>,
     /// Request of the last complete final picture.
@@ -85,9 +114,13 @@ pub(super) struct View {
     pub(super) canvas: Canvas,
     /// Last complete pass of the newest request.
     pub(super) done: Option<Origin>,
+    /// Provenance of the pixels of the last complete pass.
+    pub(super) provenance: NamedSettings,
     pub(super) cost: Cost,
     /// Gains of the light groups in the radiance that pages show; 1 for the picture as it is rendered.
     gains: Gains,
+    /// Whether the final picture is denoised; `None` for a view without a denoiser.
+    denoises: Option<bool>,
     /// Number of the first request that has the present size of the picture.
     of_size: u32,
     /// Pixel near which tiles are rendered first.
@@ -115,13 +148,17 @@ impl View {
             cards: CardBoard::new(&wish.settings.cards),
             refinement: Refinement::new(start.is_fitted(&wish)),
             wish,
+            denoises: (start.finish == Finish::Denoised).then_some(true),
+            options: start.options.clone(),
             start,
             is_outdated: false,
+            upload: None,
             unread: None,
             settled: None,
             refused: None,
             canvas: Canvas::default(),
             done: None,
+            provenance: NamedSettings::default(),
             cost: Cost::default(),
             gains: [[1.0; 3]; MAX_LIGHT_GROUPS],
             of_size: 0,
@@ -150,11 +187,13 @@ impl View {
         let out = self.start.out.as_deref();
         let mut hello = self.start.facts.hello(&self.first, out, self.steering == Some(number));
         hello["size_stated"] = json!(self.start.is_size_stated);
+        hello["environment"] = describe::environment(&self.start.options);
+        hello["denoises"] = json!(self.denoises.is_some());
         hello["light_groups"] = json!(self.wish.settings.picture.light_groups);
         hello.to_string()
     }
 
-    /// Replaces the scene by one that was read again from its files. Edits of pages stay if they are possible
+    /// Replaces the scene by one that was read again from its files with `options`. Edits of pages stay if they are possible
     /// in it. Pages are greeted anew.
     ///
     /// # Errors
@@ -162,6 +201,7 @@ impl View {
     pub(super) fn replace(
         &mut self,
         (sketch, facts): (Sketch, SceneFacts),
+        options: &SceneOptions,
         light_groups: &[String],
     ) -> Result<(), RenderError> {
         let with_groups = |wish: &Wish| {
@@ -175,6 +215,7 @@ impl View {
             self.set_gains([[1.0; 3]; MAX_LIGHT_GROUPS]);
         }
         (self.start.sketch, self.start.facts, self.start.wish) = (sketch, facts, first);
+        self.start.options.clone_from(options);
         (self.first, self.scene, self.wish) = (scene_of_first, scene, wish);
         (self.refused, self.settled, self.unread) = (None, None, None);
         self.refinement.wish(true);
@@ -193,6 +234,7 @@ impl View {
     /// Removes a page. If it steered, the page that has been connected longest steers next.
     pub(super) fn disconnect(&mut self, number: PageNumber) {
         self.pages.remove(&number);
+        self.upload.take_if(|(page, ..)| *page == number);
         if self.steering == Some(number) {
             self.steering = None;
             if let Some(next) = self.pages.keys().next().copied() {
@@ -225,6 +267,9 @@ impl View {
     pub(super) fn keep_scene(&mut self, reason: &str) {
         self.tell_error(reason);
         self.unread = Some(with_flags(reason));
+        if !self.is_outdated {
+            self.options.clone_from(&self.start.options);
+        }
         self.revisions.state += 1;
     }
 
@@ -244,6 +289,27 @@ impl View {
         }
     }
 
+    /// Takes the next bytes of a file that a page has announced. After the last ones the scene is read again,
+    /// with this environment. Returns false if the page has announced none, or fewer bytes.
+    pub(super) fn receive_bytes(&mut self, number: PageNumber, more: &[u8]) -> bool {
+        let Some((_, announced, mut bytes)) = self.upload.take_if(|(page, ..)| *page == number) else {
+            return false;
+        };
+        bytes.extend(more);
+        if bytes.len() < announced.length {
+            self.upload = Some((number, announced, bytes));
+            return true;
+        }
+        let is_whole = bytes.len() == announced.length;
+        if is_whole && self.steering == Some(number) {
+            let dropped = DroppedFile { name: announced.name, bytes };
+            self.options.environment = Some(EnvironmentOption::Dropped(Arc::new(dropped)));
+            (self.options.sky, self.options.north) = (None, None);
+            self.is_outdated = true;
+        }
+        is_whole
+    }
+
     /// If the page steers, records the number of its message; the next state message repeats this number.
     fn note(&mut self, number: PageNumber, id: Option<u64>) {
         if let Some(id) = id.filter(|_| self.steering == Some(number)) {
@@ -257,11 +323,11 @@ impl View {
             Request::Steer => self.steer(number),
             Request::Pick(at) => self.pick(number, at)?,
             Request::Layer(shown) => self.show(number, shown)?,
-            Request::Save(_) if self.start.out.is_none() => {
-                return Err("pictures are saved only by a view with --out DIR".into());
+            Request::Save(Saving { is_download: false, .. }) if self.start.out.is_none() => {
+                return Err("pictures are saved only by a view with --out DIR: download it".into());
             }
-            Request::Save(_) if !self.refinement.is_settled() => {
-                return Err("the picture is not settled yet: save it when it is".into());
+            Request::Save(Saving { is_download: true, .. }) if self.pages[&number].has_file() => {
+                return Err("the picture before is still on its way".into());
             }
             Request::Save(saving) => return Ok(Effect::Save(saving)),
             steering => {
@@ -293,6 +359,7 @@ impl View {
             }
             Request::Reset => {
                 self.set_gains([[1.0; 3]; MAX_LIGHT_GROUPS]);
+                self.denoises = self.denoises.map(|_| true);
                 let picture = &self.wish.settings.picture;
                 wish = self.start.wish.clone();
                 (wish.settings.picture.width, wish.settings.picture.height) = (picture.width, picture.height);
@@ -300,9 +367,23 @@ impl View {
                     wish.add_layers();
                 }
             }
+            Request::Denoise(value) => return self.denoise(value),
             Request::Mix { group, gain } => return self.mix(&group, gain),
             Request::Reload => {
                 self.is_outdated = true;
+                return Ok(());
+            }
+            Request::Turn(degrees) => {
+                if !self.options.environment.as_ref().is_some_and(EnvironmentOption::is_map) {
+                    return Err("there is no environment map to turn: drop one, or use --environment".into());
+                }
+                self.options.environment_rotation = Some(degrees);
+                self.is_outdated = true;
+                return Ok(());
+            }
+            Request::Drop(announced) => {
+                let page = self.steering.unwrap_or_default();
+                self.upload = Some((page, announced, Vec::new()));
                 return Ok(());
             }
             Request::Cursor(at) => {
@@ -332,9 +413,45 @@ impl View {
     fn set_gains(&mut self, gains: Gains) {
         if gains != self.gains {
             self.gains = gains;
-            self.pages.values_mut().for_each(Page::mix_again);
+            self.pages.values_mut().for_each(Page::show_again);
         }
         self.revisions.state += 1;
+    }
+
+    /// Shows the final picture denoised, or as it is rendered. No pixel is rendered again.
+    fn denoise(&mut self, value: bool) -> Result<(), String> {
+        let denoises = self.denoises.as_mut().ok_or("the view has no denoiser: start it with --denoise")?;
+        *denoises = value;
+        self.pages.values_mut().for_each(Page::show_again);
+        self.revisions.state += 1;
+        Ok(())
+    }
+
+    /// Returns whether the final picture is shown and saved denoised.
+    pub(super) fn denoises(&self) -> bool {
+        self.denoises == Some(true)
+    }
+
+    /// Last whole pass of the newest request; `None` before its first.
+    pub(super) fn unsettled(&self) -> Option<Unsettled> {
+        let origin = self.done?;
+        let mut provenance = self.provenance.clone();
+        let assignments = self.wish.assignments();
+        provenance.extend(input::provenance(&SceneOptions { assignments, ..self.start.options.clone() }));
+        let Origin { step, samples, .. } = origin;
+        let spp = self.wish.settings.integrator.samples;
+        provenance.insert("unsettled".into(), json!({"step": step, "samples": samples, "of": spp}));
+        Some(Unsettled {
+            patches: self.canvas.of_pass(origin),
+            wish: self.wish.clone(),
+            provenance,
+            origin: self.scene.offset.to_array(),
+        })
+    }
+
+    /// Queues a file for a page, if it is still connected.
+    pub(super) fn send_file(&mut self, number: PageNumber, message: Vec<u8>) {
+        self.of_page(number, |page| page.send_file(message));
     }
 
     /// Gains of the light groups; `None` for the picture as it is rendered.
@@ -431,9 +548,14 @@ impl View {
             Outgoing::State(has_all) => Ok(self.describe(has_all).to_string()),
             Outgoing::Cards => Ok(self.cards.describe().to_string()),
             Outgoing::Tile(patch, shown) => {
-                let gains = self.gains().filter(|_| shown == Shown::Radiance);
-                Err(Outgoing::Tile(patch, gains.map_or(shown, Shown::Mix)))
+                let rendered = if self.denoises() { Shown::Radiance } else { Shown::Rendered };
+                let shown = match shown {
+                    Shown::Radiance => self.gains().map_or(rendered, Shown::Mix),
+                    other => other,
+                };
+                Err(Outgoing::Tile(patch, shown))
             }
+            file @ Outgoing::File(_) => Err(file),
         })
     }
 
@@ -447,8 +569,9 @@ impl View {
 
     /// Words of the command that renders the final picture of the newest request.
     pub(super) fn command(&self) -> Vec<String> {
-        let Start { options, quality, finish, .. } = &self.start;
-        command_line::words(options, *quality, *finish, &self.wish)
+        let Start { options, quality, .. } = &self.start;
+        let finish = if self.denoises() { Finish::Denoised } else { Finish::Rendered };
+        command_line::words(options, *quality, finish, &self.wish)
     }
 
     /// State as a message to a page. Its field `settled` can be true only if `has_all`: the page has all
@@ -479,6 +602,7 @@ impl View {
             "command": command_line::quoted(&self.command()),
             "changes": describe::changes(&self.wish),
             "settings": describe::settings(settings),
+            "denoised": self.denoises(),
             "gains": describe::gains(settings, &self.gains),
             "cost": self.cost.describe(),
         })

@@ -199,7 +199,7 @@ impl World {
         let Some(page) = self.pages.get_mut(&number) else { return false };
         match message {
             Ok(text) => page.read(&serde_json::from_str(&text).unwrap()),
-            Err(Outgoing::Tile(patch, Shown::Radiance)) => page.draw(&patch.message(Shown::Radiance)),
+            Err(Outgoing::Tile(patch, Shown::Rendered)) => page.draw(&patch.message(Shown::Rendered)),
             Err(Outgoing::Tile(patch, shown)) => page.received += patch.message(shown).len() as u64,
             Err(other) => panic!("{other:?}"),
         }
