@@ -63,8 +63,8 @@ impl Hands {
     }
 }
 
-/// Polls a future until it is complete. On [`Hands::Threads`] it is complete at the first call.
-pub(crate) fn completed<F: Future>(future: F) -> F::Output {
+/// Polls a future until it is complete. Work on threads is complete at the first call.
+pub fn completed<F: Future>(future: F) -> F::Output {
     let mut future = pin!(future);
     let context = &mut Context::from_waker(Waker::noop());
     loop {
@@ -111,8 +111,8 @@ async fn in_turns<F: Future>(works: impl Iterator<Item = F>) -> Vec<F::Output> {
     .await
 }
 
-/// Pends once.
-async fn turn() {
+/// Pends once, so that other work goes on.
+pub async fn turn() {
     let mut is_over = false;
     poll_fn(|_| if std::mem::replace(&mut is_over, true) { Poll::Ready(()) } else { Poll::Pending }).await;
 }

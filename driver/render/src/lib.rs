@@ -41,7 +41,7 @@ pub use address::CardAddress;
 pub use chip::{ChipFileError, ChipModel};
 pub use error::{CardError, RenderError};
 pub use greeting::{CardInfo, card_info, card_ping};
-pub use hands::ChipWorkers;
+pub use hands::{ChipWorkers, completed, turn};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
 pub use observer::{Observer, Phase, Unobserved};
 pub use passes::{Aim, Ending, Passes};

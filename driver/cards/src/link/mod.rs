@@ -14,7 +14,7 @@ pub use fault_injector::{FaultInjector, LineFaults};
 pub use loopback::{LoopbackPort, loopback};
 #[cfg(not(target_family = "wasm"))]
 pub use system::{
-    HostPort, ListedPort, ListenAddress, Listener, SerialLink, StreamPort, connect_tcp, connect_unix,
-    list_serial_ports, open_serial,
+    HostPort, ListedPort, Listener, SerialLink, StreamPort, connect_tcp, connect_unix, list_serial_ports,
+    open_serial,
 };
-pub use system::{LinkError, RemoteAddress, SerialOptions, host_name, reach};
+pub use system::{LinkError, ListenAddress, RemoteAddress, SerialOptions, host_name, reach};

@@ -3,6 +3,7 @@
 #![cfg_attr(target_family = "wasm", expect(dead_code, reason = "a browser opens no links"))]
 
 mod error;
+mod listen_address;
 mod reach;
 mod remote_address;
 mod serial_options;
@@ -25,8 +26,9 @@ mod unsupported;
 pub use error::LinkError;
 #[cfg(not(target_family = "wasm"))]
 pub use host_port::HostPort;
+pub use listen_address::ListenAddress;
 #[cfg(not(target_family = "wasm"))]
-pub use listener::{ListenAddress, Listener};
+pub use listener::Listener;
 pub use reach::reach;
 pub use remote_address::{RemoteAddress, host_name};
 #[cfg(not(target_family = "wasm"))]
