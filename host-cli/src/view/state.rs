@@ -384,6 +384,7 @@ impl View {
             Request::Drop(announced) => {
                 let page = self.steering.unwrap_or_default();
                 self.upload = Some((page, announced, Vec::new()));
+                self.reply(page, &json!({"type": "announced"}));
                 return Ok(());
             }
             Request::Cursor(at) => {
