@@ -1,6 +1,7 @@
 // A kept picture over the present one, up to a line that a slider moves.
 
 import { displayOn } from "./display.js";
+import { putAt } from "./zoom.js";
 import { Picture } from "./picture.js";
 
 const byId = id => document.getElementById(id);
@@ -9,6 +10,7 @@ export class Compare {
     #kept = null;
     #camera = null;
     #display = null;
+    #place = [0, 0, 0, 0];
 
     // `changed()` is called when the pictures must be shown otherwise, `go(camera)` moves to where one was kept.
     constructor(changed, go) {
@@ -38,14 +40,17 @@ export class Compare {
     }
 
     #show() {
-        byId("kept").hidden = byId("compare").hidden = !this.isOn;
+        for (const id of ["kept", "edge", "compare"]) byId(id).hidden = !this.isOn;
         this.#cut();
         this.changed();
     }
 
     // The kept picture is left of the line.
     #cut() {
-        byId("kept").style.clipPath = `inset(0 ${100 - Number(byId("split").value)}% 0 0)`;
+        const share = Number(byId("split").value) / 100;
+        const [left, top, width, height] = this.#place;
+        byId("kept").style.clipPath = `inset(0 ${100 - 100 * share}% 0 0)`;
+        Object.assign(byId("edge").style, { left: `${left + share * width}px`, top: `${top}px`, height: `${height}px` });
     }
 
     // Shows both by one exposure, at the same place.
@@ -53,7 +58,10 @@ export class Compare {
         if (this.isOn) this.#display.draw(this.#kept, tone);
     }
 
+    // The picture has another place [left, top, width, height] on the stage.
     layOut(place) {
-        Object.assign(byId("kept").style, place);
+        this.#place = place;
+        putAt(byId("kept"), place);
+        this.#cut();
     }
 }

@@ -21,7 +21,7 @@ import { decoded, fileOf } from "./tiles.js";
 import { Times } from "./times.js";
 import { MODES } from "./tone.js";
 import { Turntable } from "./turntable.js";
-import { Zoom } from "./zoom.js";
+import { Zoom, putAt } from "./zoom.js";
 
 const byId = id => document.getElementById(id);
 
@@ -286,10 +286,9 @@ function fitting() {
 
 // Places the canvas on the stage: in the middle, or as it was magnified and shifted.
 function layOut() {
-    const place = zoom.place(stageSize(), fitting()).map(value => `${value}px`);
-    const style = Object.fromEntries(["left", "top", "width", "height"].map((name, at) => [name, place[at]]));
-    Object.assign(canvas.style, style);
-    compare.layOut(style);
+    const place = zoom.place(stageSize(), fitting());
+    putAt(canvas, place);
+    compare.layOut(place);
     setText("zoom-fit", `${Math.round(100 * zoom.factor)} %`);
     showCentre();
 }

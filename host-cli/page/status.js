@@ -9,7 +9,7 @@ const progress = {
     lost: () => "No connection: trying again. A command that was started anew prints another address.",
     refused: state => `Refused: ${state.refused}`,
     settled: () => "Finished: the command below renders this picture, to the last bit.",
-    working: state => !state || state.samples === 0 ? "Waiting for the first picture."
+    working: state => !state || state.samples === 0 ? "Waiting for the picture."
         : state.step > 1 ? `Preview: every ${ORDINALS[state.step] ?? `${state.step}th`} pixel.`
             : `Getting better: ${state.samples} of ${state.spp} samples a pixel.`,
 };

@@ -3,6 +3,10 @@
 const GREATEST = 32;
 const clamped = (value, low, high) => Math.min(Math.max(value, low), high);
 
+// Puts an element at a place [left, top, width, height] on the stage.
+export const putAt = ({ style }, place) =>
+    ["left", "top", "width", "height"].forEach((side, at) => style[side] = `${place[at]}px`);
+
 export class Zoom {
     // Factor beyond the fitting size, and the point of the picture in the middle of the stage, as shares of its sides.
     factor = 1;

@@ -326,7 +326,9 @@ impl View {
             Request::Save(Saving { is_download: false, .. }) if self.start.out.is_none() => {
                 return Err("pictures are saved only by a view with --out DIR: download it".into());
             }
-            Request::Save(Saving { is_download: true, .. }) if self.pages[&number].has_file() => {
+            Request::Save(Saving { is_download: true, .. })
+                if self.pages.get(&number).is_some_and(Page::has_file) =>
+            {
                 return Err("the picture before is still on its way".into());
             }
             Request::Save(saving) => return Ok(Effect::Save(saving)),
