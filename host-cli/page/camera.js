@@ -77,6 +77,33 @@ export function dollied(camera, centre, factor) {
     return moved(zoomed(camera, factor), sub(way, scaled(forward, dot(way, forward))));
 }
 
+const isWithin = (point, { low, high }) => point.every((value, axis) => low[axis] <= value && value <= high[axis]);
+
+// Bounds that are smaller by a share of their least side.
+function shrunk({ low, high }, share) {
+    const margin = share * Math.min(...sub(high, low));
+    return { low: low.map(value => value + margin), high: high.map(value => value - margin) };
+}
+
+// The space in which a camera stays that is within a room of these bounds; null for a camera outside. A camera at its border is inside,
+// however it was rounded.
+export const roomOf = ({ position }, bounds) => isWithin(position, shrunk(bounds, 0.01)) ? shrunk(bounds, 0.02) : null;
+
+// The camera after a move, kept in a room. An orbit comes closer to its centre where a wall is in its way; other moves end at the wall, or
+// go along it.
+export function kept(camera, room, centre = null) {
+    const { position, look_at } = camera;
+    if (isWithin(position, room)) return camera;
+    const hasCentre = centre && isWithin(centre, room);
+    const shares = hasCentre ? position.map((value, axis) => {
+        const way = value - centre[axis];
+        return way === 0 ? 1 : ((way > 0 ? room.high : room.low)[axis] - centre[axis]) / way;
+    }) : [];
+    const place = hasCentre ? add(centre, scaled(sub(position, centre), Math.min(1, ...shares)))
+        : position.map((value, axis) => clamped(value, room.low[axis], room.high[axis]));
+    return { ...camera, position: place, look_at: add(place, sub(look_at, position)) };
+}
+
 // Flight by metres to the right, upwards (in the world) and forward.
 export function flown(camera, [rightward, upward, onward]) {
     const { right, forward } = axes(camera);

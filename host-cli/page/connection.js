@@ -2,7 +2,7 @@
 
 const FIRST_WAIT = 250;
 const MAX_WAIT = 4000;
-// Bytes that may wait to be sent before a camera is left out: a newer one follows.
+// Bytes that may wait to be sent before a camera or a part of a file is left for later.
 const MAX_WAITING = 16384;
 // Bytes of tiles after which they are acknowledged: a fourth of those that may be on the way.
 const SHARE = 1 << 20;
@@ -14,7 +14,7 @@ export class Connection {
     #acknowledged = 0;
     #id = 0;
 
-    // `handlers` has `message(object)`, `tile(buffer)` and `changed(isOpen)`.
+    // `handlers` has `message(object)`, `tile(buffer)`, which takes files too, and `changed(isOpen)`.
     constructor(address, handlers) {
         Object.assign(this, { address, handlers });
         this.#open();
@@ -58,6 +58,12 @@ export class Connection {
         if (!this.isOpen) return 0;
         this.#socket.send(JSON.stringify({ ...message, id: ++this.#id }));
         return this.#id;
+    }
+
+    // Sends bytes of a file that was announced. Returns whether there is a connection.
+    upload(bytes) {
+        if (this.isOpen) this.#socket.send(bytes);
+        return this.isOpen;
     }
 
     // Whoever takes tiles in slowly gets fewer; drawings do not hold them up.

@@ -1,6 +1,6 @@
 // Mouse, touch, wheel and keys on the picture, as moves of the camera.
 
-import { depth, dollied, flown, length, middle, panned, projected, sub, turned, zoomed } from "./camera.js";
+import { depth, dollied, flown, kept, length, middle, panned, projected, roomOf, sub, turned, zoomed } from "./camera.js";
 
 const TURN = 0.006; // radians for each pixel of a drag
 const WHEEL = 0.0012; // share of the distance for each pixel of the wheel
@@ -21,9 +21,12 @@ export class Controls {
     #held = new Set();
     #moved = 0;
     #resting = 0;
+    // Where an orbit would be without walls, for as long as it lasts: it finds its distance again.
+    #free = null;
 
-    // `view` has `camera`, `scene` (bounds), `size` (the picture's, pixels), `steers`, and takes `move(camera, isMoving)`,
-    // `pick([x, y])` and `cursor([x, y] or null)`.
+    // `view` has `camera`, `scene` (bounds), `size` (the picture's, pixels), `steers`, `staysInside` and `movesPicture`, and takes
+    // `move(camera, isMoving)`, `wall()`, `pick([x, y])`, `cursor([x, y] or null)`, `magnify(factor, [x, y] of the window)` and
+    // `slide([dx, dy])` of the picture on the stage.
     constructor(canvas, view) {
         Object.assign(this, { canvas, view });
         const listen = (target, type, act) => target.addEventListener(type, act.bind(this), { passive: false });
@@ -47,8 +50,8 @@ export class Controls {
     }
 
     // Centre of a turn: the chosen one as long as it is in the picture.
-    turnCentre() {
-        const { camera, scene, size } = this.view;
+    turnCentre(camera = this.view.camera) {
+        const { scene, size } = this.view;
         const place = this.centre && projected(camera, this.centre, size);
         const isSeen = place && place.every((value, axis) => value >= 0 && value <= size[axis]);
         return isSeen ? this.centre : middle(camera, scene);
@@ -71,25 +74,57 @@ export class Controls {
         const place = [event.clientX, event.clientY];
         const [dx, dy] = sub(place, last);
         this.#moved += Math.hypot(dx, dy);
-        if (this.#moved < CLICK || !this.view.steers) return;
+        if (this.#moved < CLICK || !(this.view.steers || this.view.movesPicture)) return;
         const others = [...this.#pointers].filter(([id]) => id !== event.pointerId).map(([, other]) => other);
         this.#pointers.set(event.pointerId, place);
-        this.view.move(others.length > 0 ? this.#pinched(last, place, others[0]) : this.#dragged(event, dx, dy), true);
+        if (others.length > 0) this.#pinched(last, place, others[0]);
+        else if (this.view.movesPicture) this.view.slide([dx, dy]);
+        else this.#dragged(event, dx, dy);
     }
 
     #dragged({ buttons, shiftKey }, dx, dy) {
         const { camera } = this.view;
-        const centre = this.turnCentre();
-        if (buttons & 4 || shiftKey) return this.#pan(camera, [dx, dy], centre);
-        return turned(camera, buttons & 2 ? camera.position : centre, -dx * TURN, -dy * TURN);
+        if (buttons & 4 || shiftKey) this.#go(this.#pan(camera, [dx, dy], this.turnCentre()), true);
+        else if (buttons & 2) this.#go(turned(camera, camera.position, -dx * TURN, -dy * TURN), true);
+        else this.orbit(-dx * TURN, -dy * TURN);
+    }
+
+    // Turns about the centre, by radians.
+    orbit(yaw, pitch) {
+        this.#free ??= this.view.camera;
+        const centre = this.turnCentre(this.#free);
+        const free = turned(this.#free, centre, yaw, pitch);
+        this.#go(free, true, centre);
+        this.#free = free;
+    }
+
+    // Ends a move: the camera rests.
+    rest() {
+        this.#free = null;
+        this.view.move(this.view.camera, false);
+    }
+
+    // Moves the camera as far as walls let it, about a centre or anyhow.
+    #go(next, isMoving, centre = null) {
+        const { camera, scene, staysInside } = this.view;
+        const room = staysInside ? roomOf(camera, scene) : null;
+        const there = room ? kept(next, room, centre) : next;
+        this.#free = null;
+        this.view.move(there, isMoving);
+        if (there !== next) this.view.wall();
     }
 
     // Two fingers: their middle pans, their distance dollies.
     #pinched(last, place, other) {
-        const centre = this.turnCentre();
         const [before, now] = [last, place].map(finger => Math.max(length(sub(finger, other)), 1));
         const shift = sub(place, last).map(value => value / 2);
-        return dollied(this.#pan(this.view.camera, shift, centre), centre, before / now);
+        if (this.view.movesPicture) {
+            this.view.slide(shift);
+            this.view.magnify(now / before, place.map((value, axis) => (value + other[axis]) / 2));
+            return;
+        }
+        const centre = this.turnCentre();
+        this.#go(dollied(this.#pan(this.view.camera, shift, centre), centre, before / now), true);
     }
 
     #pan(camera, shift, centre) {
@@ -98,19 +133,24 @@ export class Controls {
 
     #up(event) {
         if (!this.#pointers.delete(event.pointerId) || this.#pointers.size > 0) return;
-        if (this.#moved >= CLICK) this.view.move(this.view.camera, false);
+        if (this.#moved >= CLICK && this.view.movesPicture) return;
+        if (this.#moved >= CLICK) this.rest();
         else if (event.type === "pointerup" && event.button === 0) this.view.pick(this.#place(event));
     }
 
     #wheel(event) {
         event.preventDefault();
-        if (!this.view.steers) return;
         const pixels = event.deltaY * [1, 16, 400][event.deltaMode];
         const factor = Math.exp(Math.min(Math.max(pixels * WHEEL, -1), 1));
+        if (event.ctrlKey || this.view.movesPicture) {
+            this.view.magnify(1 / factor, [event.clientX, event.clientY]);
+            return;
+        }
+        if (!this.view.steers) return;
         const { camera } = this.view;
-        this.view.move(event.altKey ? zoomed(camera, factor) : dollied(camera, this.turnCentre(), factor), true);
+        this.#go(event.altKey ? zoomed(camera, factor) : dollied(camera, this.turnCentre(), factor), true);
         clearTimeout(this.#resting);
-        this.#resting = setTimeout(() => this.view.move(this.view.camera, false), REST);
+        this.#resting = setTimeout(() => this.rest(), REST);
     }
 
     #key(event) {
@@ -130,9 +170,13 @@ export class Controls {
             const rates = [0, 0, 0, 0, 0, 0];
             for (const code of this.#held) rates[KEYS[code][0]] += KEYS[code][1];
             const isHeld = this.#held.size > 0 && this.view.steers;
-            this.view.move(isHeld ? this.#flown(rates.map(rate => rate * seconds)) : this.view.camera, isHeld);
-            if (isHeld) this.#fly(now);
-            else this.#held.clear();
+            if (isHeld) {
+                this.#go(this.#flown(rates.map(rate => rate * seconds)), true);
+                this.#fly(now);
+            } else {
+                this.rest();
+                this.#held.clear();
+            }
         });
     }
 

@@ -5,8 +5,8 @@ import { CURVES, SHADER, codes, marked } from "./tone.js";
 const CORNERS = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1); }`;
 
-// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, overlay, greatest}. `restored()` is called
-// when a lost context is there again.
+// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, overlay, greatest, isPreview}. Of a preview the shader smooths the
+// squares, the processor does not. `restored()` is called when a lost context is there again.
 export function displayOn(canvas, restored) {
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
     const gl = canvas.getContext("webgl2", options);
@@ -43,14 +43,14 @@ class Shader {
         }
         gl.useProgram(program);
         this.place = Object.fromEntries(
-            ["scale", "mode", "curve", "overlay", "greatest"].map(name => [name, gl.getUniformLocation(program, name)]));
+            ["scale", "mode", "curve", "overlay", "greatest", "isPreview"].map(name => [name, gl.getUniformLocation(program, name)]));
         gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
         for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
             gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
         }
     }
 
-    draw(picture, { mode, scale, curve, overlay, greatest }) {
+    draw(picture, { mode, scale, curve, overlay, greatest, isPreview = false }) {
         const { gl, canvas, place } = this;
         if (gl.isContextLost()) return;
         this.#upload(picture);
@@ -59,6 +59,7 @@ class Shader {
         gl.uniform1i(place.curve, CURVES.indexOf(curve));
         gl.uniform1i(place.overlay, overlay);
         gl.uniform1f(place.greatest, greatest);
+        gl.uniform1i(place.isPreview, isPreview);
         gl.viewport(0, 0, canvas.width, canvas.height);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
     }

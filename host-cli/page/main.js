@@ -1,30 +1,49 @@
 // The page of `photoncard view`: connects the command, the picture and the controls.
 
-import { extent, pose, projected, rounded, shortest } from "./camera.js";
+import { Bookmarks } from "./bookmarks.js";
+import { extent, pose, projected, roomOf, rounded, shortest } from "./camera.js";
+import { Compare } from "./compare.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { displayOn } from "./display.js";
+import { Surroundings } from "./environment.js";
 import { Exposure } from "./exposure.js";
 import { element } from "./fields.js";
+import { History } from "./history.js";
+import { Inspector } from "./inspector.js";
 import { Overlay } from "./overlay.js";
 import { Pace } from "./pace.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
-import { copy, setText, showStatus, tell } from "./status.js";
-import { decoded } from "./tiles.js";
+import { Saving } from "./saving.js";
+import { copy, hint, hush, setText, showStatus, tell } from "./status.js";
+import { decoded, fileOf } from "./tiles.js";
 import { Times } from "./times.js";
+import { MODES } from "./tone.js";
+import { Turntable } from "./turntable.js";
+import { Zoom, putAt } from "./zoom.js";
 
 const byId = id => document.getElementById(id);
+
+// What the layers are for those who look at pictures.
+const LAYERS = {
+    radiance: "picture", direct: "direct light", indirect: "indirect light", caustic: "caustics", albedo: "albedo, colour of surfaces",
+    N: "N, normals", Z: "Z, depth", P: "P, positions",
+};
 const canvas = byId("picture");
 const drawing = new Pace(draw), sending = new Pace(sendMoves);
 const display = displayOn(canvas, () => drawing.soon());
 const picture = new Picture();
 const times = new Times();
+const history = new History();
+const zoom = new Zoom();
+const inspector = new Inspector();
 
 // State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map(), mixes: new Map() };
+const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map(), mixes: new Map(),
+    saveId: 0, changed: 0, refused: 0, tone: null };
 // Pixel under the pointer; null for none.
 let pointed = null;
 
@@ -43,17 +62,22 @@ function show() {
 
 const send = (what, message) => {
     const id = connection.send(message);
-    if (what) times.sent(id, what);
+    if (what) {
+        times.sent(id, what);
+        asked.changed = id;
+    }
     return id;
 };
 
 const panel = new Panel(
     (name, value) => {
+        exposure.hold();
         asked.edits.set(name, value);
         sending.soon();
     },
     (name, value) => send(name, { type: "setting", name, value }),
     (name, value) => {
+        exposure.hold();
         asked.mixes.set(name, value);
         sending.soon();
     });
@@ -68,10 +92,26 @@ const view = {
         isCameraOwn = true;
         toSend = { isMoving };
         byId("camera").value = "";
+        if (!isMoving) noteCamera();
         sending.soon();
         showCentre();
     },
-    pick: at => scene && send("", { type: "pick", at }),
+    get staysInside() { return byId("inside").checked; },
+    get movesPicture() { return isPressed("hand"); },
+    wall: () => hint("The wall of the room is here. Untick \u201cstay in the room\u201d to go through it."),
+    magnify(factor, place) {
+        const box = byId("stage").getBoundingClientRect();
+        zoomBy(factor, [place[0] - box.left, place[1] - box.top]);
+    },
+    slide(by) {
+        zoom.shift(by, fitting());
+        layOut();
+    },
+    pick(at) {
+        // A finger has no other way to point.
+        this.cursor(at);
+        if (scene) send("", { type: "pick", at });
+    },
     cursor(at) {
         asked.cursor = pointed = at;
         sending.soon();
@@ -80,16 +120,37 @@ const view = {
 };
 const controls = new Controls(canvas, view);
 
+// Goes to a camera that was kept.
+const visit = place => place && view.steers && view.move(place, false);
+const bookmarks = new Bookmarks(() => camera, visit);
+const compare = new Compare(() => drawing.soon(), visit);
+const turntable = new Turntable(yaw => view.steers && controls.orbit(yaw, 0), () => { press("turntable", false); controls.rest(); },
+    () => Number(byId("period").value));
+const surroundings = new Surroundings({
+    send: message => send("environment", message),
+    upload: bytes => connection.upload(bytes),
+    isBusy: () => connection.isBusy,
+    told: tell,
+});
+const saving = new Saving(fields => asked.saveId = send("", { type: "save", ...fields, ...exposure.asked }));
+
+const isPressed = id => byId(id).getAttribute("aria-pressed") === "true";
+const press = (id, value) => byId(id).setAttribute("aria-pressed", value);
+
 function take(message) {
     const act = {
         hello, state: takeState,
         cards: ({ cards }) => panel.cards(cards),
-        saved: ({ path }) => byId("saved").textContent = `saved ${path}`,
+        saved: ({ path }) => saving.saved(path),
+        announced: () => surroundings.begin(),
         picked: ({ point }) => { controls.centre = point; showCentre(); },
         steers: ({ value }) => setSteers(value),
         error({ text, id }) {
             tell(text);
+            asked.refused = asked.changed;
             if (id && id === asked.cameraId) followCamera();
+            if (id && id === asked.saveId) saving.refused();
+            if (id) surroundings.refused(id);
             if (state) panel.update(state, true);
         },
     }[message.type];
@@ -98,19 +159,21 @@ function take(message) {
 
 function hello(message) {
     if (scene === null && message.size_stated) asked.side = "";
-    scene = { ...message.scene };
+    scene = { ...message.scene, isNew: scene?.name !== message.scene.name };
     byId("scene").textContent = document.title = scene.name;
     panel.show(scene);
     panel.showGroups(message.light_groups);
     const options = (id, entries) =>
         byId(id).replaceChildren(...entries.map(([value, textContent]) => element("option", { value, textContent })));
-    options("layer", message.layers.map(name => [name, name]));
+    options("layer", message.layers.map(name => [name, LAYERS[name] ?? name]));
     options("camera", [["", "—"], ...scene.cameras.map(({ name }, index) => [index, name])]);
     options("side", [["", "as started"], ...[128, 256, 512, 1024].map(side => [side, `${side} pixels`]), ["window", "the window's"]]);
     byId("layer").value = asked.layer;
     byId("side").value = asked.side;
-    byId("saved").textContent = message.out === null ? "Start the command with --out DIR to save files." : `to ${message.out}`;
-    for (const id of ["save-exr", "save-png", "name"]) byId(id).disabled = message.out === null;
+    saving.open(message.out);
+    bookmarks.open(scene.name);
+    surroundings.show(message.environment ?? null);
+    byId("denoise").parentElement.hidden = !message.denoises;
     picture.restart(0);
     state = null;
     setSteers(message.steers);
@@ -122,7 +185,7 @@ function setSteers(value) {
     steers = value;
     asked.size = null;
     byId("spectator").hidden = steers;
-    for (const field of document.querySelectorAll("#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset")) {
+    for (const field of document.querySelectorAll("#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset, #denoise, #rotation, #map, #turntable")) {
         field.inert = !steers;
     }
     if (steers) fit();
@@ -147,6 +210,14 @@ function takeState(message) {
     if (message.id) times.known(message.id, message.version);
     picture.resize(message.size);
     if (!isCameraOwn || !steers) camera = message.camera;
+    if (scene.isNew) {
+        scene.isNew = false;
+        byId("inside").checked = roomOf(camera, scene) !== null;
+        noteCamera();
+    }
+    // What was refused is of no interest once something else was done.
+    if (asked.changed > asked.refused && message.id >= asked.changed) hush();
+    byId("denoise").checked = message.denoised;
     panel.update(message);
     if (message.settled) times.settled(message.version);
     if (document.activeElement !== byId("fov")) showExtent();
@@ -160,6 +231,8 @@ function takeState(message) {
 }
 
 function takeTile(buffer) {
+    const file = fileOf(buffer);
+    if (file) return saving.offer(file);
     const tile = decoded(buffer);
     if (!tile || !picture.put(tile)) return;
     // The first picture after a change is shown at once, and so is every whole one.
@@ -175,7 +248,15 @@ function followCamera() {
     byId("camera").value = "";
     if (!state) return;
     camera = state.camera;
+    noteCamera();
     showCentre();
+}
+
+// The camera has come to rest.
+function noteCamera() {
+    history.note(camera);
+    byId("undo").disabled = !history.canUndo;
+    byId("redo").disabled = !history.canRedo;
 }
 
 // Asks for the size that the window or the panel wants.
@@ -189,23 +270,43 @@ function fit() {
     asked.size = size;
 }
 
-// Places the canvas in the middle of the stage, as large as it can be.
-function layOut() {
+const stageSize = () => {
     const box = byId("stage").getBoundingClientRect();
-    const [width, height] = picture.size;
-    const fitting = Math.min(box.width / width, box.height / height);
+    return [box.width, box.height];
+};
+
+// Size of the picture on the stage, as large as it can be.
+function fitting() {
+    const stage = stageSize(), { size } = picture;
     // A picture of the window's size is shown pixel by pixel.
-    const factor = Math.floor(box.width) === width && Math.floor(box.height) === height ? 1 : fitting;
-    canvas.style.width = `${width * factor}px`;
-    canvas.style.height = `${height * factor}px`;
+    const isExact = stage.every((side, axis) => Math.floor(side) === size[axis]);
+    const factor = isExact ? 1 : Math.min(...stage.map((side, axis) => side / size[axis]));
+    return size.map(side => side * factor);
+}
+
+// Places the canvas on the stage: in the middle, or as it was magnified and shifted.
+function layOut() {
+    const place = zoom.place(stageSize(), fitting());
+    putAt(canvas, place);
+    compare.layOut(place);
+    setText("zoom-fit", `${Math.round(100 * zoom.factor)} %`);
     showCentre();
+}
+
+// Magnifies the picture about a point of the stage.
+function zoomBy(factor, at = stageSize().map(side => side / 2)) {
+    zoom.by(factor, at, stageSize(), fitting());
+    layOut();
 }
 
 function draw() {
     const isSettled = state?.settled && picture.version === state.version;
-    display.draw(picture, { ...exposure.of(asked.layer, picture, isSettled), ...overlay.tone });
+    const tone = exposure.of(asked.layer, picture, isSettled);
+    display.draw(picture, { ...tone, ...overlay.tone, isPreview: !isSettled && tone.mode === MODES.light });
+    compare.draw({ ...tone, overlay: 0, greatest: 1 });
     times.drawn(picture);
     setText("times", times.text);
+    asked.tone = tone;
     showValue();
 }
 
@@ -238,14 +339,13 @@ function showCentre() {
     const place = camera && controls.centre && projected(camera, controls.centre, picture.size);
     byId("centre").hidden = !place;
     if (!place) return;
-    const factor = canvas.clientWidth / picture.size[0];
+    const factor = canvas.offsetWidth / picture.size[0];
     byId("centre").style.left = `${canvas.offsetLeft + place[0] * factor}px`;
     byId("centre").style.top = `${canvas.offsetTop + place[1] * factor}px`;
 }
 
 function showValue() {
-    const value = pointed ? picture.at(pointed) : [];
-    setText("value", value.length ? `${pointed.join(", ")}: ${value.map(part => part.toPrecision(4)).join("  ")}` : "\u00a0");
+    if (asked.tone) inspector.show(pointed, picture, asked.tone);
     overlay.show(pointed);
 }
 
@@ -261,11 +361,6 @@ function showLayer() {
 function png() {
     const tone = exposure.options;
     return tone && ` -o picture.png${tone}`;
-}
-
-function save(ending) {
-    const name = `${byId("name").value.trim().replace(/\.(exr|png)$/i, "")}.${ending}`;
-    send("", { type: "save", name, ...exposure.asked });
 }
 
 const on = (id, type, act) => byId(id).addEventListener(type, act);
@@ -288,12 +383,29 @@ on("fov", "input", ({ target }) => target.validity.valid && target.value !== "" 
 on("reset", "click", () => {
     asked.edits.clear();
     asked.mixes.clear();
+    exposure.relax();
     followCamera();
     send("reset", { type: "reset" });
 });
 on("steer", "click", () => send("", { type: "steer" }));
-on("save-exr", "click", () => save("exr"));
-on("save-png", "click", () => save("png"));
+on("denoise", "change", ({ target }) => {
+    picture.restart(picture.version);
+    send("denoise", { type: "denoise", value: target.checked });
+});
+on("hush", "click", hush);
+on("undo", "click", () => travel(() => history.undone()));
+on("redo", "click", () => travel(() => history.redone()));
+on("turntable", "click", () => isPressed("turntable") ? turntable.stop() : startTurntable());
+on("zoom-in", "click", () => zoomBy(1.5));
+on("zoom-out", "click", () => zoomBy(1 / 1.5));
+on("zoom-fit", "click", fitPicture);
+on("hand", "click", () => press("hand", !isPressed("hand")));
+on("keep", "click", () => compare.keep(picture, camera));
+on("inspector", "toggle", () => {
+    inspector.renew();
+    showValue();
+});
+on("workings", "toggle", ({ target }) => byId("times").hidden = !target.open);
 on("copy-command", "click", ({ target }) => copy(byId("command").textContent, target));
 on("copy-pose", "click", ({ target }) => camera && copy(pose(camera), target));
 on("toggle", "click", ({ target }) => {
@@ -301,6 +413,43 @@ on("toggle", "click", ({ target }) => {
     byId("panel").hidden = !isShown;
     target.setAttribute("aria-expanded", isShown);
 });
+
+// Goes to another camera of the history, which stays as it is.
+function travel(choose) {
+    if (!view.steers) return;
+    turntable.stop();
+    visit(choose());
+}
+
+function startTurntable() {
+    press("turntable", true);
+    turntable.start();
+}
+
+function fitPicture() {
+    zoom.fit();
+    layOut();
+}
+
+// Whatever else a person does ends the turntable.
+for (const type of ["pointerdown", "wheel", "keydown"]) {
+    addEventListener(type, ({ target }) => target.id !== "turntable" && turntable.stop(), { capture: true, passive: true });
+}
+
+addEventListener("keydown", event => {
+    if (event.target.closest?.("input:not([type=checkbox], [type=range]), textarea")) return;
+    const key = event.key.toLowerCase();
+    const isCommand = (event.ctrlKey || event.metaKey) && !event.altKey;
+    if (isCommand && (key === "z" || key === "y")) {
+        event.preventDefault();
+        travel(() => key === "y" || event.shiftKey ? history.redone() : history.undone());
+    }
+    if (isCommand || event.altKey) return;
+    if (key === "escape") hush();
+    if (key === "0") fitPicture();
+    if (key >= "1" && key <= "9") bookmarks.visit(Number(key) - 1);
+});
+
 let resized = 0;
 new ResizeObserver(() => {
     layOut();
@@ -310,7 +459,7 @@ new ResizeObserver(() => {
 
 // For tests and for whoever looks in the browser's console.
 window.photoncard = {
-    times, picture, view, connection, display,
+    times, picture, view, connection, display, controls, history, zoom, turntable, exposure,
     get scene() { return scene; },
     get state() { return state; },
     // True if the picture is finished and no change of it is on its way. A change that the command refuses has no answer.

@@ -1,4 +1,4 @@
-// The picture as far as it has come: four floats a pixel, of which the last is the mark of an overlay. Coarse pixels fill step x
+// The picture as far as it has come: four floats a pixel. The last is the mark of an overlay or, without one, the negative coarseness. Coarse pixels fill step x
 // step ones.
 
 export class Picture {
@@ -84,7 +84,8 @@ export class Picture {
             data[to] = pixels[from];
             data[to + 1] = pixels[from + 1];
             data[to + 2] = pixels[from + 2];
-            data[to + 3] = row === 0 || at < x + step ? edge : inner;
+            const mark = row === 0 || at < x + step ? edge : inner;
+            data[to + 3] = mark < 0 ? -step : mark;
             if (--left === 0) {
                 left = step;
                 from += 3;

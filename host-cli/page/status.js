@@ -3,14 +3,15 @@
 const byId = id => document.getElementById(id);
 const ORDINALS = { 2: "2nd", 4: "4th", 8: "8th" };
 const MESSAGE_TIME = 8000;
+const HINT_TIME = 4000;
 
 const progress = {
     lost: () => "No connection: trying again. A command that was started anew prints another address.",
     refused: state => `Refused: ${state.refused}`,
-    settled: () => "Settled: this is the picture of the command below, to the last bit.",
-    working: state => !state ? "Waiting for the first picture."
-        : state.step > 1 ? `Coarse: every ${ORDINALS[state.step] ?? `${state.step}th`} pixel.`
-            : `Refining: ${state.samples} of ${state.spp} samples a pixel.`,
+    settled: () => "Finished: the command below renders this picture, to the last bit.",
+    working: state => !state || state.samples === 0 ? "Waiting for the picture."
+        : state.step > 1 ? `Preview: every ${ORDINALS[state.step] ?? `${state.step}th`} pixel.`
+            : `Getting better: ${state.samples} of ${state.spp} samples a pixel.`,
 };
 
 export function showStatus(isOpen, state, more) {
@@ -25,12 +26,25 @@ export function setText(id, text) {
     if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
-let ending = 0;
-export function tell(text) {
-    byId("message").textContent = text;
-    byId("message").hidden = false;
-    clearTimeout(ending);
-    ending = setTimeout(() => byId("message").hidden = true, MESSAGE_TIME);
+// Shows a text in an element for some time.
+function flash(id, into, text, time) {
+    setText(into, text);
+    byId(id).hidden = false;
+    clearTimeout(endings.get(id));
+    endings.set(id, setTimeout(() => byId(id).hidden = true, time));
+}
+
+const endings = new Map();
+
+// Tells what was refused, or has failed.
+export const tell = text => flash("message", "reason", text, MESSAGE_TIME);
+
+// Tells what a move has met.
+export const hint = text => flash("hint", "hint", text, HINT_TIME);
+
+// Takes a message away: it was read, or holds no longer.
+export function hush() {
+    byId("message").hidden = true;
 }
 
 export async function copy(text, button) {

@@ -17,7 +17,7 @@ export const CURVES = ["none", "reinhard", "aces"];
 // Marks over the picture: none, the colour of the card, or a map of heat.
 export const OVERLAYS = { none: 0, card: 1, heat: 2 };
 
-const luminance = (red, green, blue) => Math.fround(0.2126 * red + 0.7152 * green + 0.0722 * blue);
+export const luminance = (red, green, blue) => Math.fround(0.2126 * red + 0.7152 * green + 0.0722 * blue);
 
 // Scale that brings the log-average luminance of the lit pixels to middle grey. `stride` skips pixels: 1 takes all.
 export function automaticScale(data, stride = 1) {
@@ -83,6 +83,7 @@ precision highp sampler2D;
 uniform sampler2D picture;
 uniform float scale, greatest;
 uniform int mode, curve, overlay;
+uniform bool isPreview;
 out vec4 colour;
 
 vec3 compressed(vec3 x) {
@@ -116,8 +117,46 @@ vec3 marked(vec3 shown, float mark) {
     return mix(vec3(dot(shown, vec3(0.2126, 0.7152, 0.0722))), heat(clamp(mark / greatest, 0.0, 1.0)), 0.65);
 }
 
+const vec3 LIGHT = vec3(0.2126, 0.7152, 0.0722);
+
+// What a square of the preview shows.
+vec3 square(ivec2 at, int side) {
+    return shown(texelFetch(picture, clamp(at * side + side / 2, ivec2(0), textureSize(picture, 0) - 1), 0).rgb);
+}
+
+// A square of the preview as bright as the least and the most of its neighbours let it be: others are stray paths.
+vec3 calm(ivec2 at, int side) {
+    vec3 own = square(at, side);
+    vec2 range = vec2(1.0, 0.0);
+    for (int y = -1; y <= 1; y++) for (int x = -1; x <= 1; x++) {
+        float light = dot(square(at + ivec2(x, y), side), LIGHT);
+        if (x != 0 || y != 0) range = vec2(min(range.x, light), max(range.y, light));
+    }
+    float light = dot(own, LIGHT);
+    return own + clamp(light, range.x, range.y) - light;
+}
+
+// The squares of a preview, smoothed where neighbours look alike. Edges stay.
+vec3 smoothed(vec2 place, int side) {
+    vec2 at = place / float(side) - 0.5;
+    ivec2 nearest = ivec2(floor(at + 0.5));
+    vec3 own = calm(nearest, side);
+    vec4 sum = vec4(0.0);
+    for (int y = -2; y <= 2; y++) for (int x = -2; x <= 2; x++) {
+        vec3 value = square(nearest + ivec2(x, y), side);
+        vec2 way = vec2(nearest + ivec2(x, y)) - at;
+        vec3 change = value - own;
+        float light = dot(change, LIGHT);
+        sum += vec4(value, 1.0) * exp(-dot(way, way) / 2.0 - light * light / 0.04 - dot(change, change) / 0.3);
+    }
+    return sum.a > 0.0 ? sum.rgb / sum.a : own;
+}
+
 void main() {
     ivec2 size = textureSize(picture, 0);
-    vec4 texel = texelFetch(picture, ivec2(gl_FragCoord.x, float(size.y) - gl_FragCoord.y), 0);
-    colour = vec4(marked(shown(texel.rgb), texel.a), 1.0);
+    vec2 place = vec2(gl_FragCoord.x, float(size.y) - gl_FragCoord.y);
+    vec4 texel = texelFetch(picture, ivec2(place), 0);
+    int side = isPreview && texel.a < 0.0 ? int(-texel.a) : 0;
+    vec3 seen = side == 0 ? shown(texel.rgb) : side == 1 ? calm(ivec2(place), 1) : smoothed(place, side);
+    colour = vec4(marked(seen, texel.a), 1.0);
 }`;

@@ -210,8 +210,11 @@ fn announced(fields: &Fields) -> Result<Announced, String> {
     if !is_plain || ![".hdr", ".exr"].iter().any(|suffix| lower.ends_with(suffix)) {
         return Err("an environment map is a file .hdr or .exr with a plain name".into());
     }
-    let length = fields.whole("bytes", MAX_DROPPED).map_err(|_| {
-        format!("an environment map that is dropped has at most {} MB: use --environment", MAX_DROPPED >> 20)
+    let length = fields.whole("bytes", MAX_DROPPED).ok().filter(|length| *length > 0).ok_or_else(|| {
+        format!(
+            "an environment map that is dropped has 1 byte to {} MB: use --environment",
+            MAX_DROPPED >> 20
+        )
     })?;
     Ok(Announced { name, length: length as usize })
 }

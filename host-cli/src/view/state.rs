@@ -326,7 +326,9 @@ impl View {
             Request::Save(Saving { is_download: false, .. }) if self.start.out.is_none() => {
                 return Err("pictures are saved only by a view with --out DIR: download it".into());
             }
-            Request::Save(Saving { is_download: true, .. }) if self.pages[&number].has_file() => {
+            Request::Save(Saving { is_download: true, .. })
+                if self.pages.get(&number).is_some_and(Page::has_file) =>
+            {
                 return Err("the picture before is still on its way".into());
             }
             Request::Save(saving) => return Ok(Effect::Save(saving)),
@@ -384,6 +386,7 @@ impl View {
             Request::Drop(announced) => {
                 let page = self.steering.unwrap_or_default();
                 self.upload = Some((page, announced, Vec::new()));
+                self.reply(page, &json!({"type": "announced"}));
                 return Ok(());
             }
             Request::Cursor(at) => {

@@ -192,3 +192,25 @@ fn a_view_without_possible_settings_reports_it_until_it_has_some() {
     world.check_pictures();
     assert_eq!(refused(&mut world), Value::Null);
 }
+
+/// Only the page that has announced a file sends its bytes, and no more than it has announced.
+#[test]
+fn bytes_that_no_page_has_announced_end_its_connection() {
+    let mut world = World::new();
+    world.connect();
+    world.connect();
+    assert!(!world.view.receive_bytes(0, b"map"));
+    let announced = json!({"type": "drop", "name": "sky.hdr", "bytes": 5});
+    world.send(0, &announced);
+    assert!(!world.view.receive_bytes(1, b"123"), "another page");
+    assert!(world.view.receive_bytes(0, b"123"));
+    assert!(!world.view.receive_bytes(0, b"456"), "a byte too many");
+    assert!(!world.view.takes_reload());
+    world.send(0, &announced);
+    assert!(world.view.receive_bytes(0, b"123") && world.view.receive_bytes(0, b"45"));
+    assert!(world.view.takes_reload());
+    // A page that leaves takes what it has sent with it.
+    world.send(0, &announced);
+    world.disconnect(0);
+    assert!(!world.view.receive_bytes(0, b"123"));
+}

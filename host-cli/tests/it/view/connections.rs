@@ -65,6 +65,9 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
         json!({"type": "save", "name": "../secret.exr"}),
         json!({"type": "save", "name": "/tmp/a.exr"}),
         json!({"type": "save", "name": "a.sh"}),
+        json!({"type": "drop", "name": "../sky.hdr", "bytes": 9}),
+        json!({"type": "drop", "name": "sky.hdr", "bytes": 1_u64 << 40}),
+        json!({"type": "turn", "degrees": 1e9}),
     ] {
         page.send(&message);
         let error = page.wait_for("error");

@@ -121,6 +121,100 @@ fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
     assert_ne!(denoised.pixels, read(&room.path("a.exr"), Shown::Rendered).unwrap().pixels);
     let shown = (0..12).flat_map(|y| (0..20).map(move |x| (x, y))).map(|place| page.pixels[&place]);
     assert_eq!(shown.collect::<Vec<_>>(), denoised.pixels);
+
+    // Without the denoiser the tiles come again, and no pixel is rendered.
+    page.send(&json!({"type": "denoise", "value": false}));
+    let mut plain = page.wait("state", |state| state["settled"] == true && state["denoised"] == false);
+    assert_eq!(plain["version"], state["version"]);
+    let (name, exr) = page.download("b.exr");
+    run_shown(&room, &plain, &name);
+    assert!(room.read(&name) == exr, "{}", plain["command"].take());
+    let rendered = read(&room.path("b.exr"), Shown::Rendered).unwrap();
+    let shown = (0..12).flat_map(|y| (0..20).map(move |x| (x, y))).map(|place| page.pixels[&place]);
+    assert_eq!(shown.collect::<Vec<_>>(), rendered.pixels);
+}
+
+/// A view without a folder sends the files that the shown command writes.
+#[test]
+#[cfg(unix)]
+fn a_picture_is_downloaded_without_a_folder() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    let state = page.settle();
+    for name in ["a.exr", "a.png"] {
+        let (named, contents) = page.download(name);
+        run_shown(&room, &state, name);
+        assert!(named == name && contents == room.read(name), "{named}: {}", state["command"]);
+    }
+    page.send(&json!({"type": "save", "name": "a.exr"}));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("--out"));
+    page.send(&json!({"type": "save", "name": "../a.exr", "download": true}));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("name"));
+    page.send(&json!({"type": "denoise", "value": true}));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("--denoise"));
+}
+
+/// Name and provenance say that a picture is not the final one. It has the size of the final one.
+#[test]
+fn a_picture_that_is_not_settled_is_saved_as_such() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    page.settle();
+    // So many pixels and samples that the picture is not settled before it is saved.
+    page.send(&json!({"type": "setting", "name": "spp", "value": 4096}));
+    page.send(&json!({"type": "size", "size": [401, 301]}));
+    page.wait("state", |state| state["size"] == json!([401, 301]) && state["samples"] != 0);
+    let (name, exr) = page.download("a.exr");
+    assert_eq!(name, "a-unsettled.exr");
+    room.write(&name, &exr);
+    let picture = read(&room.path(&name), Shown::Rendered).unwrap();
+    assert_eq!([picture.width, picture.height], [401, 301]);
+    assert!(picture.pixels.iter().flatten().any(|value| *value > 0.0), "the picture is black");
+    for (file, bytes) in [("a.exr", &exr), ("a.png", &page.download("a.png").1)] {
+        let says = |text: &[u8]| bytes.windows(text.len()).any(|part| part == text);
+        assert!(says(b"\"unsettled\":{\"of\":4096,") && says(b"\"scene\":\"scene.gltf\""), "{file}");
+    }
+    page.send(&json!({"type": "save", "name": "a.png"}));
+    let saved = page.wait_for("saved");
+    assert!(saved["path"].as_str().unwrap().ends_with("a-unsettled.png"), "{saved}");
+}
+
+/// The picture is that of the shown command once the file that was dropped is in its folder.
+#[test]
+#[cfg(unix)]
+fn an_environment_map_is_dropped_and_turned() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    assert_eq!(page.wait_for("hello")["environment"], json!(null));
+    page.settle();
+    page.send(&json!({"type": "turn", "degrees": 30}));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("--environment"));
+
+    let map = std::fs::read(shipped("sky.exr")).unwrap();
+    page.drop_map("my sky.exr", &map);
+    let hello = page.wait_for("hello");
+    assert_eq!(hello["environment"], json!({"name": "my sky.exr", "rotation": 0.0, "dropped": true}));
+    room.write("my sky.exr", &map);
+    for rotation in [None, Some(30.0)] {
+        if let Some(degrees) = rotation {
+            page.send(&json!({"type": "turn", "degrees": degrees}));
+            assert_eq!(page.wait_for("hello")["environment"]["rotation"], degrees);
+        }
+        let state = page.settle();
+        let (name, exr) = page.download("a.exr");
+        run_shown(&room, &state, &name);
+        assert!(room.read(&name) == exr, "{}", state["command"]);
+    }
+
+    // A file that is none leaves the scene as it was.
+    page.drop_map("no.hdr", b"no map");
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("no.hdr"));
+    page.send(&camera(0.2, false));
+    assert!(page.settle()["command"].as_str().unwrap().contains("--environment-rotation 30"));
 }
 
 /// The counts in the tile headers of the final picture add up to those that the shown command reports, also

@@ -106,6 +106,8 @@ pub(crate) struct Page {
     /// Numbers of gathers, irradiance records and DRAM lines for each tile of the newest picture at full
     /// resolution, by the tile's corner.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
+    /// Name and contents of the last downloaded picture.
+    file: Option<(String, Vec<u8>)>,
 }
 
 impl Page {
@@ -117,6 +119,7 @@ impl Page {
             pixels: HashMap::new(),
             steps: Vec::new(),
             work: HashMap::new(),
+            file: None,
         }
     }
 
@@ -143,7 +146,7 @@ impl Page {
                         return message;
                     }
                 }
-                Message::Binary(tile) => self.draw(&tile),
+                Message::Binary(bytes) => self.receive(&bytes),
                 _ => {}
             }
         }
@@ -165,6 +168,32 @@ impl Page {
         self.wait("state", |state| state["settled"] == true && Some(&state["version"]) != before.as_ref())
     }
 
+    /// Downloads the picture, and returns name and contents of its file.
+    pub(crate) fn download(&mut self, name: &str) -> (String, Vec<u8>) {
+        self.send(&json!({"type": "save", "name": name, "download": true}));
+        let begin = Instant::now();
+        while begin.elapsed() < PATIENCE {
+            if let Some(file) = self.file.take() {
+                return file;
+            }
+            match self.socket.read().unwrap() {
+                Message::Binary(bytes) => self.receive(&bytes),
+                Message::Text(text) => assert!(!text.contains("\"error\""), "{text}"),
+                _ => {}
+            }
+        }
+        panic!("no {name} after {:?}", begin.elapsed());
+    }
+
+    /// Sends an environment map.
+    pub(crate) fn drop_map(&mut self, name: &str, bytes: &[u8]) {
+        self.send(&json!({"type": "drop", "name": name, "bytes": bytes.len()}));
+        self.wait_for("announced");
+        for part in bytes.chunks(10_000) {
+            self.send_raw(Message::binary(part.to_vec()));
+        }
+    }
+
     /// Closes the connection.
     pub(crate) fn leave(mut self) {
         self.socket.close(None).unwrap();
@@ -183,8 +212,20 @@ impl Page {
         panic!("the connection stays");
     }
 
+    /// Takes a tile or a file.
+    fn receive(&mut self, bytes: &[u8]) {
+        self.received += bytes.len();
+        match bytes.strip_prefix(&u32::MAX.to_le_bytes()) {
+            None => self.draw(bytes),
+            Some(rest) => {
+                let (length, rest) = rest.split_first_chunk().unwrap();
+                let (name, contents) = rest.split_at(u32::from_le_bytes(*length) as usize);
+                self.file = Some((String::from_utf8(name.to_vec()).unwrap(), contents.to_vec()));
+            }
+        }
+    }
+
     fn draw(&mut self, tile: &[u8]) {
-        self.received += tile.len();
         let words = tile.as_chunks::<4>().0;
         let [version, step, x, y, columns, rows, _, _, work @ ..] =
             &words[..11].iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>()[..]

@@ -4,6 +4,7 @@
 mod browser;
 mod devices;
 mod latency;
+mod lighting;
 mod person;
 mod random;
 mod server;

@@ -24,6 +24,10 @@ pub(crate) trait Person {
     fn picture(&mut self) -> [f64; 4];
     /// Hides the panel, and gives the picture one pixel for each pixel of the window.
     fn fill_window(&mut self);
+    /// Presses the button with this id.
+    fn click(&mut self, button: &str);
+    /// Position of the page's camera.
+    fn position(&mut self) -> [f64; 3];
     /// Toggles the switch of a light.
     fn switch(&mut self, light: &str);
     /// Labels of the visible fields of a material.
@@ -78,6 +82,14 @@ impl Person for Tab {
         let sides = "(({width, height}) => [width, height].map(Math.floor))(stage.getBoundingClientRect())";
         self.wait(&format!("photoncard.picture.size.join() === {sides}.join()"), LIMIT);
         self.wait(SETTLED, LIMIT);
+    }
+
+    fn click(&mut self, button: &str) {
+        self.value(&format!("document.getElementById('{button}').click()"));
+    }
+
+    fn position(&mut self) -> [f64; 3] {
+        serde_json::from_value(self.value("photoncard.view.camera.position")).unwrap()
     }
 
     fn switch(&mut self, light: &str) {

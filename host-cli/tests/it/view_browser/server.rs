@@ -18,8 +18,13 @@ impl View {
     /// Starts the command on a free port. Pages save pictures in the folder `out` of `room`.
     pub(crate) fn start(room: &Room, scene: &str, options: &[&str]) -> Self {
         std::fs::create_dir_all(room.path("out")).unwrap();
+        Self::start_without_folder(room, scene, &[options, &["--out", "out"]].concat())
+    }
+
+    /// Starts the command on a free port.
+    pub(crate) fn start_without_folder(room: &Room, scene: &str, options: &[&str]) -> Self {
         let mut command = room.command();
-        command.args(["view", scene, "--listen", "127.0.0.1:0", "--out", "out"]).args(options);
+        command.args(["view", scene, "--listen", "127.0.0.1:0"]).args(options);
         let mut process = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(process.stdout.take().unwrap()).lines();
         let address = lines.by_ref().map_while(Result::ok).find_map(|line| {
