@@ -12,6 +12,7 @@ export class Surroundings {
     // The file that is on its way, and the number of the message that has announced it.
     #file = null;
     #announced = 0;
+    #map = null;
 
     // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind; `told(text)` is shown.
     constructor({ send, upload, isBusy, told }) {
@@ -37,6 +38,7 @@ export class Surroundings {
 
     // Shows the map of a scene: {name, rotation, dropped}, or null.
     show(map) {
+        this.#map = map;
         byId("rotation").disabled = map === null;
         byId("rotation").value = map?.rotation ?? 0;
         setText("degrees", `${map?.rotation ?? 0}°`);
@@ -52,9 +54,10 @@ export class Surroundings {
         if (this.#announced > 0) this.#file = file;
     }
 
-    // The command has refused a message; perhaps the one that has announced a file.
+    // Something was refused: perhaps the message of this number that has announced a file, or the file itself.
     refused(id) {
         if (id === this.#announced) this.#file = null;
+        if (!this.#file) this.show(this.#map);
     }
 
     // The command takes the file that was announced.

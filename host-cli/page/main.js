@@ -169,7 +169,7 @@ function take(message) {
             asked.refused = asked.changed;
             if (id && id === asked.cameraId) followCamera();
             if (id && id === asked.saveId) saving.refused();
-            if (id) surroundings.refused(id);
+            surroundings.refused(id);
             if (state) panel.update(state, true);
         },
     }[message.type];

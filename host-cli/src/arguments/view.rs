@@ -31,7 +31,7 @@ pub(crate) struct ViewOptions {
     /// End the view when its standard input ends, such as that of a program that has started it
     #[arg(long, help_heading = "Page", hide_short_help = true)]
     pub(crate) attached: bool,
-    /// Folder in which the page may save pictures; without this option it cannot save any
+    /// Folder in which the page may save pictures; without this option it downloads them
     #[arg(long, value_name = "DIR", help_heading = "Page")]
     pub(crate) out: Option<PathBuf>,
     /// Quality of the settled picture, the final one of each camera position, by which the options that are
