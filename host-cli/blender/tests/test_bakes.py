@@ -24,7 +24,17 @@ import scenes  # noqa: E402
 PICTURES = os.environ.get("PHOTONCARD_PICTURES", "")
 BLOCK = 10
 FLOOR = [(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)]
-KINDS = ("cameras", "images", "libraries", "materials", "meshes", "node_groups", "objects", "scenes", "worlds")
+KINDS = (
+    "cameras",
+    "images",
+    "libraries",
+    "materials",
+    "meshes",
+    "node_groups",
+    "objects",
+    "scenes",
+    "worlds",
+)
 
 
 def stage() -> bpy.types.Scene:
@@ -55,6 +65,14 @@ def blocks(picture: np.ndarray) -> np.ndarray:
     """Mean colours of blocks of pixels."""
     rows, columns = picture.shape[0] // BLOCK, picture.shape[1] // BLOCK
     return picture.reshape(rows, BLOCK, columns, BLOCK, 3).mean(axis=(1, 3))
+
+
+def export(scene: bpy.types.Scene, bake: Any = None) -> Any:
+    """What the extension exports."""
+    objects = importlib.import_module(f"{MODULE}.export.objects")
+    cameras = importlib.import_module(f"{MODULE}.export.camera")
+    graph = bpy.context.evaluated_depsgraph_get()
+    return objects.export(graph, scene.camera, cameras.frame_of(scene.render), None, bake)
 
 
 def stated() -> dict[str, object]:
@@ -92,13 +110,18 @@ class Bakes(unittest.TestCase):
             rendering.save_png(Path(PICTURES) / f"{self._testMethodName}.png", plain, ours, theirs)
         mean, expected = (each.mean(axis=(0, 1)) for each in (ours, theirs))
         error, unbaked = (self.error(each, theirs) for each in (ours, plain))
-        print(f"{self.id()}: {mean} beside {expected}; blocks {error:.4f}, {unbaked:.4f} unbaked", file=sys.stderr)
+        print(
+            f"{self.id()}: {mean} beside {expected}; blocks {error:.4f}, {unbaked:.4f} unbaked",
+            file=sys.stderr,
+        )
         np.testing.assert_allclose(mean, expected, rtol=TOLERANCE)
         self.assertLess(error, 0.03)
         # The comparison can see whether materials are baked.
         self.assertGreater(unbaked, without)
 
-    def rendered(self, scene: bpy.types.Scene, engine: str, is_baked: bool, folder: Path) -> dict[str, np.ndarray]:
+    def rendered(
+        self, scene: bpy.types.Scene, engine: str, is_baked: bool, folder: Path
+    ) -> dict[str, np.ndarray]:
         """Channels of a render; the scene is left as it was."""
         scene.photoncard.use_material_bake = is_baked
         try:
@@ -141,7 +164,15 @@ class Bakes(unittest.TestCase):
     def test_roughness_metalness_and_emission_are_baked_together(self) -> None:
         scene = stage()
         made = scenes.material("mixed", (0.8, 0.6, 0.3), Emission_Color=(0.2, 0.5, 1, 1))
-        feed(made, "ShaderNodeTexChecker", "Object", "Metallic", Scale=2.0, Color1=(1, 1, 1, 1), Color2=(0, 0, 0, 1))
+        feed(
+            made,
+            "ShaderNodeTexChecker",
+            "Object",
+            "Metallic",
+            Scale=2.0,
+            Color1=(1, 1, 1, 1),
+            Color2=(0, 0, 0, 1),
+        )
         feed(made, "ShaderNodeTexGradient", "Generated", "Roughness")
         feed(made, "ShaderNodeTexWave", "Object", "Emission Strength", Scale=0.7)
         # An image beside nodes takes the mapping of the bakes.
@@ -234,12 +265,27 @@ class Bakes(unittest.TestCase):
 
     def exported(self, scene: bpy.types.Scene, is_cancelled: Any) -> Any:
         """What a render with bakes exports."""
-        objects = importlib.import_module(f"{MODULE}.export.objects")
-        cameras = importlib.import_module(f"{MODULE}.export.camera")
         baking = importlib.import_module(f"{MODULE}.baking")
         run = lambda jobs, folder: baking.bake_materials(jobs, folder, 64, 1, is_cancelled)  # noqa: E731
-        graph = bpy.context.evaluated_depsgraph_get()
-        return objects.export(graph, scene.camera, cameras.frame_of(scene.render), None, run)
+        return export(scene, run)
+
+    def test_textures_of_two_mappings_are_joined_by_a_bake_alone(self) -> None:
+        scene = stage()
+        made = scenes.matte("two", (0, 0, 0))
+        first = scenes.texture(made, scenes.image("colour", scenes.checker()), "Emission Color")
+        scenes.texture(made, scenes.image("strength", scenes.checker()), "Emission Strength")
+        tree = made.node_tree
+        mapping, place = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+        mapping.inputs["Scale"].default_value = (2, 3, 1)
+        tree.links.new(place.outputs["UV"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], first.inputs["Vector"])
+        scenes.quad("floor", FLOOR, made)
+        self.assertRegex(
+            "\n".join(export(scene).notices.lines()), "textures are rendered as their means .*: two"
+        )
+        baked = self.exported(scene, lambda: False)
+        self.assertEqual(baked.notices.lines(), [])
+        self.assertIn("emissiveTexture", baked.glb.root["materials"][0])
 
     def test_nothing_is_baked_that_gltf_says(self) -> None:
         scene = stage()
@@ -297,9 +343,7 @@ class TiledImages(unittest.TestCase):
                         file.unlink()
                 ours = rendering.colour(rendering.passes(scene, "PHOTONCARD", Path(folder)))
                 self.assertEqual(stated(), before)
-                np.testing.assert_allclose(
-                    ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=TOLERANCE
-                )
+                np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=TOLERANCE)
                 difference = blocks(ours) - blocks(theirs)
                 self.assertLess(float(np.sqrt(np.mean(difference**2)) / theirs.mean()), 0.03)
 
@@ -307,10 +351,7 @@ class TiledImages(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             scene = self.board(folder)
             Path(folder, "board.1002.png").unlink()
-            objects = importlib.import_module(f"{MODULE}.export.objects")
-            cameras = importlib.import_module(f"{MODULE}.export.camera")
-            graph = bpy.context.evaluated_depsgraph_get()
-            lines = objects.export(graph, scene.camera, cameras.frame_of(scene.render)).notices.lines()
+            lines = export(scene).notices.lines()
         self.assertRegex("\n".join(lines), r"Base Color takes its unlinked value .*board\.1002\.png.*: tiled")
 
 
