@@ -1,10 +1,11 @@
 """Bakes inputs of materials to images, in Blender without a window.
 
-The argument is a folder with a library of the materials, `jobs.json` and a mesh for each job.
+The argument is a folder with `jobs.json` and a mesh for each job.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -38,20 +39,25 @@ def main(folder: str) -> None:
     bpy.ops.preferences.addon_enable(module="cycles")
     with open(os.path.join(folder, "jobs.json"), encoding="utf-8") as file:
         stated = json.load(file)
-    names = list(dict.fromkeys(job["material"] for job in stated["jobs"]))
-    with bpy.data.libraries.load(os.path.join(folder, "materials.blend")) as (_, wanted):
-        wanted.materials = list(names)
-    materials = dict(zip(names, wanted.materials))
     _set_up(bpy.context.scene, stated["frame"])
     failures = {}
     for number, job in enumerate(stated["jobs"]):
         try:
-            _bake(folder, number, job, materials[job["material"]], stated["size"])
+            _bake(folder, number, job, _material(**job["material"]), stated["size"])
         except Exception as error:
             traceback.print_exc()
             failures[number] = f"{type(error).__name__}: {error}"
     with open(os.path.join(folder, "failures.json"), "w", encoding="utf-8") as file:
         json.dump(failures, file)
+
+
+@functools.cache
+def _material(library: str, name: str) -> bpy.types.Material:
+    with bpy.data.libraries.load(library) as (_, wanted):
+        wanted.materials = [name]
+    if wanted.materials[0] is None:
+        raise RuntimeError(f"there is no material {name} in {library}")
+    return wanted.materials[0]
 
 
 def _set_up(scene: bpy.types.Scene, frame: int) -> None:

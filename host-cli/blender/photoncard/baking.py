@@ -84,14 +84,19 @@ def bake_materials(
 
     Raises `BakeError` if no job can be done, or `BakeCancelledError`.
     """
+    own = os.path.join(folder, "materials.blend")
     described = []
     for number, job in enumerate(jobs):
         np.savez(os.path.join(folder, f"{number}.npz"), **job.arrays)
         inputs = [{"path": path, "is_normal": is_normal} for path, is_normal in job.inputs.items()]
-        described.append({"object": job.ob, "material": job.material.original.name, "inputs": inputs})
+        linked = job.material.original.library
+        library = bpy.path.abspath(linked.filepath) if linked else own
+        material = {"library": library, "name": job.material.original.name}
+        described.append({"object": job.ob, "material": material, "inputs": inputs})
     try:
-        library = os.path.join(folder, "materials.blend")
-        bpy.data.libraries.write(library, {job.material.original for job in jobs}, fake_user=True)
+        # Blender writes no contents of linked materials.
+        local = {job.material.original for job in jobs if not job.material.original.library}
+        bpy.data.libraries.write(own, local, fake_user=True)
         with open(os.path.join(folder, "jobs.json"), "w", encoding="utf-8") as file:
             json.dump({"size": size, "frame": frame, "jobs": described}, file)
         _run("bake_materials.py", [folder], _PATIENCE * len(jobs), is_cancelled)

@@ -224,6 +224,35 @@ class Bakes(unittest.TestCase):
         self.compare(scene, 0.1)
         bpy.data.node_groups.remove(group)
 
+    def test_objects_of_one_mesh_share_a_bake_unless_nodes_ask_where_they_are(self) -> None:
+        scene = stage()
+        made = scenes.matte("noise", (1, 1, 1))
+        node = feed(made, "ShaderNodeTexNoise", "Object")
+        first = scenes.quad("first", FLOOR, made)
+        scenes.placed("other", first.data, (5, 0, 0))
+        root = self.exported(scene, lambda: False).glb.root
+        self.assertEqual((len(root["materials"]), len(root["meshes"])), (1, 1))
+        place = made.node_tree.nodes.new("ShaderNodeNewGeometry")
+        made.node_tree.links.new(place.outputs["Position"], node.inputs["Vector"])
+        root = self.exported(scene, lambda: False).glb.root
+        self.assertEqual((len(root["materials"]), len(root["meshes"])), (2, 2))
+
+    def test_a_material_of_a_library_is_baked(self) -> None:
+        scene = stage()
+        made = scenes.matte("linked", (1, 1, 1))
+        feed(made, "ShaderNodeTexNoise", "Object")
+        with tempfile.TemporaryDirectory() as folder:
+            path = f"{folder}/materials.blend"
+            bpy.data.libraries.write(path, {made}, fake_user=True)
+            bpy.data.materials.remove(made)
+            with bpy.data.libraries.load(path, link=True) as (_, wanted):
+                wanted.materials = ["linked"]
+            scenes.quad("floor", FLOOR, wanted.materials[0])
+            exported = self.exported(scene, lambda: False)
+            bpy.data.libraries.remove(bpy.data.libraries[0])
+        self.assertEqual(exported.notices.lines(), [])
+        self.assertIn("baseColorTexture", exported.glb.root["materials"][0]["pbrMetallicRoughness"])
+
     def test_overlapping_charts_are_not_baked_into_one(self) -> None:
         scene = stage()
         made = scenes.matte("shared", (1, 1, 1))

@@ -16,14 +16,8 @@ from .meshes import Corners, materials_of
 
 BakeMaterials = Callable[[Sequence[BakeJob], str], list[Baked | BakeError]]
 """Does jobs, with files in a folder that outlives what it returns. Raises `BakeError` if none can be done."""
-_OF_PLACE = {
-    "ShaderNodeAmbientOcclusion",
-    "ShaderNodeNewGeometry",
-    "ShaderNodeObjectInfo",
-    "ShaderNodeTexCoord",
-    "ShaderNodeVectorTransform",
-}
-"""Nodes whose values may be others on another object of the same mesh."""
+_OF_PLACE = {"ShaderNodeNewGeometry", "ShaderNodeObjectInfo", "ShaderNodeVectorTransform"}
+"""Nodes whose values are others on another object of the same mesh; more are in `_differs_by_place`."""
 
 
 @dataclass
@@ -90,6 +84,7 @@ class MaterialBakes:
 def _differs_by_place(tree: bpy.types.NodeTree) -> bool:
     return any(
         node.bl_idname in _OF_PLACE
+        or (node.bl_idname == "ShaderNodeTexCoord" and node.object is not None)
         or (node.bl_idname == "ShaderNodeAttribute" and node.attribute_type != "GEOMETRY")
         or (node.bl_idname == "ShaderNodeGroup" and node.node_tree and _differs_by_place(node.node_tree))
         for node in tree.nodes
