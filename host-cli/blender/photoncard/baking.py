@@ -1,6 +1,6 @@
 """Bakes nodes that glTF has no counterpart of, by Cycles in another Blender without a window.
 
-Cycles cannot be called inside a render of another engine, and the other Blender changes nothing of this one's file.
+Cycles cannot be called inside a render of another engine, and another Blender changes nothing of this one.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def stage() -> bpy.types.Scene:
 def feed(
     made: bpy.types.Material, kind: str, coordinates: str, socket: str = "Base Color", **inputs: Any
 ) -> bpy.types.Node:
-    """Feeds an input of a Principled BSDF by a texture node in coordinates; `Scale=3` sets an input of the node."""
+    """Feeds an input of a Principled BSDF by a texture node; `Scale=3` sets an input of the node."""
     tree = made.node_tree
     node, place = tree.nodes.new(kind), tree.nodes.new("ShaderNodeTexCoord")
     for name, value in inputs.items():
@@ -284,7 +284,11 @@ class Bakes(unittest.TestCase):
         baking = importlib.import_module(f"{MODULE}.baking")
         before, started = stated(), []
         popen = baking.subprocess.Popen
-        watched = lambda *stated, **named: started.append(popen(*stated, **named)) or started[-1]  # noqa: E731
+
+        def watched(*arguments: Any, **named: Any) -> Any:
+            started.append(popen(*arguments, **named))
+            return started[-1]
+
         with mock.patch.object(baking.subprocess, "Popen", watched):
             with self.assertRaises(baking.BakeCancelledError):
                 self.exported(scene, lambda: True)

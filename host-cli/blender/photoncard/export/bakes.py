@@ -26,6 +26,7 @@ class MaterialBakes:
 
     materials: MaterialExporter
     notices: Notices
+    _seen: set[tuple[object, ...]] = field(default_factory=set)
     _jobs: dict[tuple[object, ...], BakeJob] = field(default_factory=dict)
     _done: dict[tuple[object, ...], PartBake] = field(default_factory=dict)
 
@@ -35,17 +36,24 @@ class MaterialBakes:
         if ob.type != "MESH":
             return
         stated = materials_of(ob, instance.instance_object if instance.is_instance else ob)
-        unsaid = {slot: self.materials.unsaid(material) for slot, material in enumerate(stated)}
-        if not any(unsaid.values()):
+        wanted = {
+            slot: self._key(ob, slot, stated, instance.matrix_world)
+            for slot, material in enumerate(stated)
+            if self.materials.unsaid(material)
+        }
+        new = {slot: key for slot, key in wanted.items() if key not in self._seen}
+        if not new:
             return
+        self._seen.update(new.values())
         corners = Corners(ob.data, ob.name, self.notices)
         for slot, triangles in corners.by_material(len(stated)):
-            inputs = unsaid.get(slot)
-            key = self._key(ob, slot, stated, instance.matrix_world)
-            if inputs and key not in self._jobs:
-                described = _described(ob, instance.matrix_world)
-                arrays = corners.arrays(triangles)
-                self._jobs[key] = BakeJob(self.materials.shown(stated[slot]), inputs, described, arrays)
+            if slot in new:
+                self._jobs[new[slot]] = BakeJob(
+                    self.materials.shown(stated[slot]),
+                    self.materials.unsaid(stated[slot]),
+                    _described(ob, instance.matrix_world),
+                    corners.arrays(triangles),
+                )
 
     def bake(self, run: BakeMaterials, folder: str) -> None:
         """Has all parts baked, with images in a folder; those that cannot be are named."""
@@ -66,6 +74,8 @@ class MaterialBakes:
         self, ob: bpy.types.Object, materials: list[bpy.types.Material | None], matrix: Matrix
     ) -> dict[int, PartBake]:
         """What was baked for an object with these materials, by their slots."""
+        if not self._done:
+            return {}
         found = {
             slot: self._done.get(self._key(ob, slot, materials, matrix)) for slot in range(len(materials))
         }
@@ -74,7 +84,7 @@ class MaterialBakes:
     def _key(
         self, ob: bpy.types.Object, slot: int, materials: list[bpy.types.Material | None], matrix: Matrix
     ) -> tuple[object, ...]:
-        material = self.materials.shown(materials[slot] if materials else None)
+        material = self.materials.shown(materials[slot])
         key: tuple[object, ...] = (ob.data.as_pointer(), slot, material.name_full if material else "")
         if material is not None and material.node_tree and _differs_by_place(material.node_tree):
             key += (ob.name_full, *(number for row in matrix for number in row))

@@ -100,7 +100,7 @@ def tiled_pixels(image: bpy.types.Image) -> Tiles | None:
 
 
 def _tile(image: bpy.types.Image, number: int) -> np.ndarray:
-    """Linear pixels of a tile. Blender gives scripts those of the first alone: the others are loaded by themselves."""
+    """Linear pixels of a tile. Of a tiled image Blender gives scripts those of the first tile alone."""
     row, column = divmod(number - 1001, 10)
     pattern = bpy.path.abspath(image.filepath, library=image.library)
     path = pattern.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")

@@ -44,7 +44,7 @@ class MaterialExporter:
         return self._override or material
 
     def unsaid(self, material: bpy.types.Material | None) -> dict[Path, bool]:
-        """Inputs of a slot's material that are to be baked, with whether each is a normal; none if glTF says all.
+        """Inputs of a slot's material that are to be baked, with whether each is a normal.
 
         If one value is to be baked, all that vary are, since textures that glTF joins have one mapping.
         """

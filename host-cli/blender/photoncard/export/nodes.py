@@ -24,7 +24,7 @@ class Place(NamedTuple):
 
 
 Path = tuple[str, ...]
-"""A socket that a tree's copy has too: names of the group nodes and of the node, and the input's identifier."""
+"""An input in any copy of a tree: names of the group nodes and of the node, and the socket's identifier."""
 
 
 def path_of(place: Place) -> Path:

@@ -60,7 +60,8 @@ def export(
     is_view: bool = False,
 ) -> Exported:
     """Exports an evaluated scene as its view layer shows it to a camera. `bake` renders nodes of the world,
-    `bake_materials` those of materials. A viewport (`is_view`) has a camera of its own, and needs none of the scene.
+    `bake_materials` those of materials. A viewport (`is_view`) has a camera of its own, and needs none of the
+    scene.
 
     Raises `CameraError`.
     """
