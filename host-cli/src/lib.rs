@@ -16,7 +16,7 @@
 //! | `outputs`, `picture_files` | checks of output files before any work; pictures as files |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
 //! | `render` (and `prepare`), `measure`, `bake`, `autonomy`, `farm`, `view` | one module for each command |
-//! | `scene`, `documents`, `study` | one module for each command |
+//! | `scene`, `documents`, `study`, `page_folder` | one module for each command |
 //! | `card`, `pictures` | commands on cards, and on pictures (`merge`, `mix`, `tonemap`, `diff`) |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
@@ -48,6 +48,8 @@ mod memory;
 mod notices;
 #[cfg(not(target_family = "wasm"))]
 mod outputs;
+#[cfg(not(target_family = "wasm"))]
+mod page_folder;
 mod picture_files;
 #[cfg(not(target_family = "wasm"))]
 mod pictures;
@@ -103,6 +105,7 @@ pub fn main() -> ExitCode {
         Command::Merge(options) => pictures::merge(options),
         Command::Farm(command) => farm::run(command),
         Command::View(options) => view::run(options),
+        Command::Page(options) => page_folder::run(options),
         Command::Mix(options) => pictures::mix(options),
         Command::Tonemap(options) => pictures::tonemap(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),

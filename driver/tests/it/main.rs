@@ -15,4 +15,5 @@ mod standstill;
 mod studies;
 #[path = "../../scene/tests/it/support.rs"]
 mod support;
+mod turns;
 mod versions;

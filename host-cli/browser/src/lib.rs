@@ -17,6 +17,18 @@ thread_local! {
     static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
+unsafe extern "C" {
+    /// Functions that run before all others, by the linker.
+    fn __wasm_call_ctors();
+}
+
+/// Begins the instance, before all other calls.
+#[unsafe(no_mangle)]
+extern "C" fn _initialize() {
+    // SAFETY: a page calls this once. Without the call the linker would put one into every function.
+    unsafe { __wasm_call_ctors() }
+}
+
 /// Returns the address of a buffer of `length` bytes, into which the caller writes the bytes of its next
 /// call.
 #[unsafe(no_mangle)]

@@ -15,6 +15,7 @@ mod measure;
 mod merge;
 mod mix;
 mod outputs;
+mod page;
 mod photons;
 mod picture;
 mod prepare;
@@ -61,6 +62,7 @@ pub(crate) use self::measure::{MeasureOptions, PointOptions, UnitOptions};
 pub(crate) use self::merge::MergeOptions;
 pub(crate) use self::mix::MixOptions;
 pub(crate) use self::outputs::OutputOptions;
+pub(crate) use self::page::PageOptions;
 pub(crate) use self::prepare::PrepareOptions;
 pub(crate) use self::prepared::Step;
 pub(crate) use self::progress::ProgressForm;
@@ -166,6 +168,8 @@ pub(crate) enum Command {
         size.help(help).long_help(help)
     }))]
     View(Box<ViewOptions>),
+    /// Write a page that renders in the browser, without a server: files for any web host
+    Page(PageOptions),
     /// Mix the light groups of a picture anew, without a render
     Mix(MixOptions),
     /// Tone-map an EXR picture to a PNG, as a render does

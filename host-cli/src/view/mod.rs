@@ -28,7 +28,7 @@ mod http;
 mod hub;
 mod opening;
 #[cfg(not(target_family = "wasm"))]
-mod page_files;
+pub(crate) mod page_files;
 mod pages;
 mod painter;
 mod painting;

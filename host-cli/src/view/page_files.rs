@@ -13,6 +13,14 @@ const HTML: &str = "text/html; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const DRAWING: &str = "image/svg+xml";
+const MANIFEST: &str = "application/manifest+json";
+
+/// The WebAssembly module of a page that has its own host, if this program was built with it.
+#[cfg(has_module)]
+pub(crate) const PAGE_MODULE: Option<&[u8]> = Some(include_bytes!(env!("PHOTONCARD_MODULE")));
+/// The WebAssembly module of a page that has its own host, if this program was built with it.
+#[cfg(not(has_module))]
+pub(crate) const PAGE_MODULE: Option<&[u8]> = None;
 
 macro_rules! files {
     ($($kind:ident $name:literal),+ $(,)?) => {
@@ -24,8 +32,10 @@ static FILES: &[PageFile] = &files![
     HTML "index.html",
     STYLE "view.css",
     DRAWING "icon.svg",
+    MANIFEST "manifest.webmanifest",
     SCRIPT "bookmarks.js",
     SCRIPT "camera.js",
+    SCRIPT "chip.js",
     SCRIPT "compare.js",
     SCRIPT "connection.js",
     SCRIPT "controls.js",
@@ -34,20 +44,35 @@ static FILES: &[PageFile] = &files![
     SCRIPT "exposure.js",
     SCRIPT "fields.js",
     SCRIPT "history.js",
+    SCRIPT "host.js",
     SCRIPT "inspector.js",
+    SCRIPT "instance.js",
+    SCRIPT "link.js",
+    SCRIPT "local.js",
     SCRIPT "main.js",
+    SCRIPT "offline.js",
     SCRIPT "overlay.js",
     SCRIPT "pace.js",
     SCRIPT "panel.js",
     SCRIPT "picture.js",
     SCRIPT "saving.js",
+    SCRIPT "soon.js",
+    SCRIPT "start.js",
     SCRIPT "status.js",
     SCRIPT "tiles.js",
     SCRIPT "times.js",
     SCRIPT "tone.js",
     SCRIPT "turntable.js",
+    SCRIPT "wasi.js",
+    SCRIPT "words.js",
+    SCRIPT "zip.js",
     SCRIPT "zoom.js",
 ];
+
+/// Names and texts of all files.
+pub(crate) fn pages() -> impl Iterator<Item = (&'static str, &'static str)> {
+    FILES.iter().map(|file| (file.name, file.text))
+}
 
 /// Embedded file with this name; `None` if there is none.
 pub(super) fn page_file(name: &str) -> Option<&'static PageFile> {

@@ -103,9 +103,9 @@ impl From<Fault> for DirectError {
     }
 }
 
-/// Renders tiles on chips of a kind, one chip per thread of the current pool and one tile at a time. With `model`, the
-/// memory is modelled, and caches are empty at the beginning of each tile. `is_stopped` is polled before each
-/// tile.
+/// Renders tiles on chips of a kind, one chip per thread of the current pool and one tile at a time. With
+/// `model`, the memory is modelled, and caches are empty at the beginning of each tile. `is_stopped` is
+/// polled before each tile.
 ///
 /// # Errors
 /// If the card image is malformed, a chip has no room for a tile, or the work is stopped.
@@ -167,7 +167,8 @@ pub fn render_tile_of(
     outlet: Option<&mut (dyn GatherOutlet + 'static)>,
 ) -> Result<RenderedTile, Fault> {
     let (scene, lines) = image.view();
-    let Some(model) = model else {
+    // The module of a browser is small without models.
+    let Some(model) = model.filter(|_| !cfg!(target_family = "wasm")) else {
         return render_tile(chip, &scene, EmulatedDram::lent(lines, 0), frame, tile, outlet);
     };
     let (memory, delivered) = model.over(lines);

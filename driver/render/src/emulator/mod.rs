@@ -194,6 +194,10 @@ impl EmulatedCard {
         model: Option<MemoryModel>,
         shared: SharedImage,
     ) -> std::io::Result<Self> {
+        // A browser has no threads, and its module is small without the code of this one.
+        if cfg!(target_family = "wasm") {
+            return Err(std::io::ErrorKind::Unsupported.into());
+        }
         let (host, card) = loopback(LINK_CAPACITY);
         let mut card = card.patient(WOKEN_AT);
         let trace = model.as_ref().and_then(|model| model.trace.as_ref());

@@ -5,6 +5,7 @@ mod browser;
 mod devices;
 mod latency;
 mod lighting;
+mod own_host;
 mod person;
 mod random;
 mod server;

@@ -2,7 +2,10 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::support::Room;
@@ -88,4 +91,70 @@ fn answer(mut stream: TcpStream, page: &str) {
         let head = "HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nConnection: close\r\nContent-Length:";
         let _ = write!(stream, "{head} {}\r\n\r\n{page}", page.len());
     }
+}
+
+/// Plain server of the files in a folder. Dropping it ends the answers.
+pub(crate) struct FileServer {
+    pub(crate) address: String,
+    is_over: Arc<AtomicBool>,
+}
+
+impl FileServer {
+    /// Serves a folder on a port of its own.
+    pub(crate) fn start(folder: PathBuf) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("http://{}/", listener.local_addr().unwrap());
+        let is_over = Arc::new(AtomicBool::new(false));
+        let ends = is_over.clone();
+        std::thread::spawn(move || {
+            for stream in listener.incoming().map_while(Result::ok) {
+                if ends.load(Ordering::Relaxed) {
+                    return;
+                }
+                let folder = folder.clone();
+                std::thread::spawn(move || send_file(stream, &folder));
+            }
+        });
+        Self { address, is_over }
+    }
+
+    /// Ends the server: requests are no longer answered.
+    pub(crate) fn end(&self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        // The listener looks at the flag with its next connection, and is closed.
+        let _ = TcpStream::connect(self.address.trim_start_matches("http://").trim_end_matches('/'));
+    }
+}
+
+impl Drop for FileServer {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Answers one request for a file.
+fn send_file(mut stream: TcpStream, folder: &Path) {
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut head = [0; 8192];
+    let Ok(length @ 1..) = stream.read(&mut head) else { return };
+    let head = String::from_utf8_lossy(&head[..length]);
+    let path = head.split_whitespace().nth(1).unwrap_or("/").split('?').next().unwrap();
+    let name = if path == "/" { "index.html" } else { path.trim_start_matches('/') };
+    let kind = match Path::new(name).extension().and_then(|ending| ending.to_str()) {
+        Some("html") => "text/html",
+        Some("js") => "text/javascript",
+        Some("css") => "text/css",
+        Some("wasm") => "application/wasm",
+        Some("svg") => "image/svg+xml",
+        _ => "application/octet-stream",
+    };
+    let (status, body) = match std::fs::read(folder.join(name)) {
+        Ok(body) => ("200 OK", body),
+        Err(_) => ("404 Not Found", Vec::new()),
+    };
+    let length = body.len();
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+    );
+    let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&body));
 }

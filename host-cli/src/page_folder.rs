@@ -1,0 +1,147 @@
+//! Command `photoncard page`: a page that has its own host, as files for any web server.
+
+use std::fs;
+use std::path::Path;
+
+use miette::{MietteDiagnostic, Report};
+use photoncard_driver::output;
+use photoncard_shared::checksum::Checksum;
+use serde_json::{Value, json};
+
+use crate::arguments::PageOptions;
+use crate::console::print;
+use crate::failure::Failure;
+use crate::view::page_files::{PAGE_MODULE, pages};
+
+/// Name of the module in the folder.
+const MODULE: &str = "photoncard.wasm";
+/// First bytes of a WebAssembly module.
+const MAGIC: &[u8] = b"\0asm";
+/// Line of `index.html` that says where the host is.
+const COMMANDS_HOST: &str = "<meta name=\"host\" content=\"command\">";
+/// What replaces it. Nothing is loaded from elsewhere, and no script runs but the folder's own.
+const OWN_HOST: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
+    worker-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; manifest-src 'self'; base-uri 'none'; form-action 'none'\">\n\
+    <meta name=\"host\" content=\"page\">\n<link rel=\"manifest\" href=\"manifest.webmanifest\">";
+/// What the service worker has in place of the version.
+const VERSION: &str = "VERSION";
+
+/// Writes the folder of a page.
+pub(crate) fn run(options: &PageOptions) -> Result<(), Failure> {
+    let module = module(options.module.as_deref())?;
+    let scenes: Vec<(String, Vec<u8>)> =
+        options.scenes.iter().map(|path| scene(path)).collect::<Result<_, _>>()?;
+    let folder = &options.folder;
+    check_folder(folder)?;
+    let mut files: Vec<(String, Vec<u8>)> = vec![(MODULE.into(), module)];
+    let list: Vec<Value> =
+        scenes.iter().map(|(file, _)| json!({ "file": file, "title": title(file) })).collect();
+    files.push(("scenes.json".into(), json!(list).to_string().into_bytes()));
+    files.extend(scenes);
+    files.extend(
+        pages().map(|(name, text)| (name.to_owned(), text.replace(COMMANDS_HOST, OWN_HOST).into_bytes())),
+    );
+    // A browser takes a changed service worker for a new version of all files.
+    let version = version(&files);
+    for (_, bytes) in files.iter_mut().filter(|(name, _)| name == "offline.js") {
+        *bytes = String::from_utf8_lossy(bytes).replace(VERSION, &version).into_bytes();
+    }
+    let names = files.iter().map(|(name, _)| name.as_str()).filter(|name| *name != "offline.js");
+    let names: Vec<&str> = ["./"].into_iter().chain(names).collect();
+    files.push((LIST.into(), json!(names).to_string().into_bytes()));
+    for (name, bytes) in &files {
+        write(&folder.join(name), bytes)?;
+    }
+    print(&[format!("{}: {} files, for any web server", folder.display(), files.len())])
+}
+
+/// List of the files that a page keeps for use without a network.
+const LIST: &str = "files.json";
+
+/// Checks that a folder is new, empty, or one that this command has written.
+fn check_folder(folder: &Path) -> Result<(), Failure> {
+    let is_foreign = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some())
+        && !folder.join(LIST).is_file();
+    if is_foreign {
+        let text = format!("{} has other files", folder.display());
+        return Err(Failure::Input(Report::new(
+            MietteDiagnostic::new(text).with_help("state a new or empty folder"),
+        )));
+    }
+    Ok(())
+}
+
+/// Reads the module, or takes that of this program.
+fn module(stated: Option<&Path>) -> Result<Vec<u8>, Failure> {
+    let refused = |text: String, help: &str| {
+        Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help.to_owned())))
+    };
+    let Some(path) = stated else {
+        return PAGE_MODULE.map(<[u8]>::to_vec).ok_or_else(|| {
+            refused(
+                "this program was built without the module of a page".into(),
+                "build it by host-cli/module.sh FILE, and state it: --module FILE; released programs have it",
+            )
+        });
+    };
+    let bytes = fs::read(path)
+        .map_err(|error| refused(format!("cannot read {}: {error}", path.display()), "check the path"))?;
+    if !bytes.starts_with(MAGIC) {
+        return Err(refused(
+            format!("{} is no WebAssembly module", path.display()),
+            "build it by host-cli/module.sh FILE",
+        ));
+    }
+    Ok(bytes)
+}
+
+/// Reads a scene for the page's list, under `scenes/` in the folder.
+fn scene(path: &Path) -> Result<(String, Vec<u8>), Failure> {
+    let refused = |text: String, help: &str| {
+        Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help.to_owned())))
+    };
+    let bytes = fs::read(path)
+        .map_err(|error| refused(format!("cannot read {}: {error}", path.display()), "check the path"))?;
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let is_whole = bytes.starts_with(b"glTF") || !names_files(&bytes);
+    if !is_whole {
+        return Err(refused(
+            format!("{} names other files", path.display()),
+            "convert it to one file .glb, such as by: npx gltf-pipeline -i scene.gltf -o scene.glb",
+        ));
+    }
+    Ok((format!("scenes/{name}"), bytes))
+}
+
+/// Returns whether the JSON of a glTF file names other files: a URI that has no data itself.
+fn names_files(text: &[u8]) -> bool {
+    let Ok(gltf) = serde_json::from_slice::<Value>(text) else { return false };
+    let of = |list: &str| gltf[list].as_array().cloned().unwrap_or_default();
+    of("buffers")
+        .iter()
+        .chain(&of("images"))
+        .any(|entry| entry["uri"].as_str().is_some_and(|uri| !uri.starts_with("data:")))
+}
+
+/// Name of a scene on its button.
+fn title(file: &str) -> String {
+    let stem = Path::new(file).file_stem().map(|stem| stem.to_string_lossy().replace(['-', '_'], " "));
+    stem.unwrap_or_default()
+}
+
+/// Number that changes with any byte of the files.
+fn version(files: &[(String, Vec<u8>)]) -> String {
+    let mut checksum = Checksum::default();
+    for (name, bytes) in files {
+        checksum.update(name.as_bytes());
+        checksum.update(bytes);
+    }
+    format!("{:08x}", checksum.value())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(|error| Failure::folder(folder, &error))?;
+    }
+    output::write(path, bytes).map_err(|error| Failure::work_error(&error))
+}

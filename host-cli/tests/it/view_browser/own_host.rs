@@ -1,0 +1,150 @@
+//! The page whose host runs in the browser, served as plain files.
+
+use std::path::Path;
+use std::time::Duration;
+
+use data_encoding::BASE64;
+use serde_json::json;
+
+use super::browser::{Browser, Tab};
+use super::person::{Person, SETTLED};
+use super::server::{FileServer, run_shown};
+use crate::support::{Room, shipped, skip};
+
+/// Time limit of a picture: the host's work is on one core, and not optimised for this machine.
+const LIMIT: Duration = Duration::from_secs(150);
+
+/// Options of a small picture of which no setting is left to pilot renders.
+const SMALL: &str =
+    "--quality paper --size 80x80 --photons 2000 --gather-rays 4 --neighbors 10 --shadow-rays 1 --spp 2";
+
+/// Writes the page into the folder `site`; `None` if there is no module.
+fn site(room: &Room) -> Option<FileServer> {
+    let Some(module) = std::env::var_os("PHOTONCARD_TEST_MODULE") else {
+        skip(
+            "the page of a browser's own host: PHOTONCARD_TEST_MODULE names no module, which host-cli/module.sh FILE builds",
+        );
+        return None;
+    };
+    let scenes = [shipped("cornell.gltf"), shipped("room.glb")];
+    let mut command = room.command();
+    command.args(["page", "site", "--scene", &scenes[0], "--scene", &scenes[1], "--module"]).arg(module);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(FileServer::start(room.path("site")))
+}
+
+/// Opens the picture of a command line by the page's address.
+fn open(tab: &mut Tab, server: &FileServer, line: &str) {
+    tab.open("about:blank");
+    let encoded: String = line.bytes().map(|byte| format!("%{byte:02X}")).collect();
+    tab.open(&format!("{}#{encoded}", server.address));
+}
+
+/// Downloads the settled picture as an EXR, and returns its bytes.
+fn downloaded(tab: &mut Tab) -> Vec<u8> {
+    tab.value(
+        "window.taken = null; URL.createObjectURL = blob => { blob.arrayBuffer().then(bytes => \
+         window.taken = btoa(Array.from(new Uint8Array(bytes), byte => String.fromCharCode(byte)).join(''))); return 'blob:none'; }; \
+         HTMLAnchorElement.prototype.click = () => { }; 0",
+    );
+    tab.click("save-exr");
+    tab.wait("window.taken", LIMIT);
+    BASE64.decode(tab.value("window.taken").as_str().unwrap().as_bytes()).unwrap()
+}
+
+/// Checks that the downloaded EXR equals the one that the shown command line writes.
+fn check_shown(room: &Room, tab: &mut Tab) {
+    tab.wait(SETTLED, LIMIT);
+    let line = tab.value("document.getElementById('command').textContent");
+    let line = line.as_str().unwrap();
+    let saved = downloaded(tab);
+    run_shown(room, line);
+    assert!(saved == room.read("picture.exr"), "the downloaded picture differs from that of {line}");
+}
+
+#[test]
+fn a_page_with_its_own_host_settles_to_the_picture_of_the_shown_command() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let Some(server) = site(&room) else { return };
+    std::fs::create_dir_all(room.path("scenes")).unwrap();
+    for name in ["cornell.gltf", "room.glb"] {
+        std::fs::copy(shipped(name), room.path(&format!("scenes/{name}"))).unwrap();
+    }
+    let mut tab = browser.tab([900, 600]);
+    open(&mut tab, &server, &format!("photoncard render scenes/cornell.gltf {SMALL}"));
+    check_shown(&room, &mut tab);
+    tab.check_walls();
+
+    // A change of light, as on every page.
+    tab.switch("lamp");
+    check_shown(&room, &mut tab);
+
+    open(&mut tab, &server, &format!("photoncard render scenes/room.glb {SMALL}"));
+    check_shown(&room, &mut tab);
+    assert_eq!(tab.faults, Vec::<String>::new());
+}
+
+#[test]
+fn a_page_with_its_own_host_works_without_a_network() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let Some(server) = site(&room) else { return };
+    let line = format!("photoncard render scenes/cornell.gltf {SMALL}");
+    let mut tab = browser.tab([900, 600]);
+    open(&mut tab, &server, &line);
+    tab.wait("navigator.serviceWorker.controller", LIMIT);
+    tab.wait(SETTLED, LIMIT);
+    server.end();
+    open(&mut tab, &server, &line);
+    tab.wait(SETTLED, LIMIT);
+}
+
+#[test]
+fn faults_end_in_a_sentence_and_the_page_goes_on() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let Some(server) = site(&room) else { return };
+    let mut tab = browser.tab([900, 600]);
+    tab.open(&server.address);
+    tab.wait("document.querySelectorAll('#start-scenes button').length === 2", LIMIT);
+    let reason = "document.getElementById('start-reason').textContent";
+    for (name, text, expected) in [
+        ("broken.glb", "no glTF at all", "broken.glb"),
+        ("notes.txt", "x", "none of these files is a scene"),
+        ("scene.zip", "no archive", "it is no ZIP archive"),
+        (
+            "lost.gltf",
+            r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"lost.bin","byteLength":4}],"bufferViews":[]}"#,
+            "lost",
+        ),
+    ] {
+        tab.value(&format!("photoncard.start.take([[{name:?}, new File([{text:?}], {name:?})]])"));
+        tab.wait(&format!("{reason}.includes({expected:?})"), LIMIT);
+    }
+    // Another scene is still possible, and a lost host is told of.
+    open(&mut tab, &server, &format!("photoncard render scenes/cornell.gltf {SMALL}"));
+    tab.wait(SETTLED, LIMIT);
+    tab.value("photoncard.connection.drop()");
+    tab.wait(&format!("{reason}.includes('was ended')"), LIMIT);
+    tab.value("document.querySelector('#start-scenes button').click()");
+    tab.wait("window.photoncard.state", LIMIT);
+}
+
+#[test]
+fn a_folder_with_other_files_is_not_written() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("site")).unwrap();
+    room.write("site/mine.txt", b"mine");
+    let outcome = room.run(&["page", "site", "--module", "none.wasm"]);
+    assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+    room.write("none.wasm", b"no module");
+    let outcome = room.run(&["page", "site", "--module", "none.wasm"]);
+    assert!(outcome.stderr.contains("is no WebAssembly module"), "{}", outcome.stderr);
+    room.write("module.wasm", b"\0asm");
+    let outcome = room.run(&["page", "site", "--module", "module.wasm"]);
+    assert!(outcome.stderr.contains("has other files"), "{}", outcome.stderr);
+    assert!(room.run(&["page", "new", "--module", "module.wasm"]).status == Some(0));
+    assert!(Path::new(&room.path("new/index.html")).is_file());
+}
