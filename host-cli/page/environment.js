@@ -25,14 +25,15 @@ export class Surroundings {
             this.#take(target.files);
             target.value = "";
         });
-        stage.addEventListener("dragover", event => {
+        // Beside the picture too: the browser would leave the page for a file that is dropped there.
+        addEventListener("dragover", event => {
             event.preventDefault();
             stage.classList.add("target");
         });
-        for (const type of ["dragleave", "drop"]) stage.addEventListener(type, () => stage.classList.remove("target"));
-        stage.addEventListener("drop", event => {
+        for (const type of ["dragleave", "drop"]) addEventListener(type, () => stage.classList.remove("target"));
+        addEventListener("drop", event => {
             event.preventDefault();
-            this.#take(event.dataTransfer.files);
+            if (!byId("map").closest("[inert]")) this.#take(event.dataTransfer.files);
         });
     }
 
