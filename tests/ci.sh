@@ -19,6 +19,8 @@ declare -A target_of=(
 )
 # Other systems that the command is for: it is compiled for them, and neither linked nor run.
 systems=(x86_64-pc-windows-gnu aarch64-apple-darwin)
+# What compiles the vector kernels of the firmware for browsers.
+wasm_vectors="-C target-feature=+simd128"
 # Code that panics and may be in any image all the same, and in that of one board: docs/bring-up.md has the reasons.
 allowed_panics='core::slice::sort::shared::smallsort::panic_on_ord_violation|core::panicking::panic_fmt'
 smoltcp_panics='core::option::unwrap_failed|core::result::unwrap_failed|core::panicking::panic|core::panicking::panic_bounds_check'
@@ -168,6 +170,7 @@ check_lint() {
     step "check for wasm32-unknown-unknown"
     if rustup target add wasm32-unknown-unknown; then
         cargo clippy -p photoncard-map -p photoncard-cards --target wasm32-unknown-unknown --locked -- -D warnings
+        RUSTFLAGS=$wasm_vectors cargo clippy -p photoncard-firmware --target wasm32-unknown-unknown --locked -- -D warnings
     else
         skip "the check of what a browser runs" "rustup cannot add wasm32-unknown-unknown"
     fi
@@ -207,6 +210,19 @@ check_boards() {
     tests/bring_up_figures.sh check
 }
 
+# The firmware's tests with the vector instructions of WebAssembly.
+test_wasm() {
+    step "tests with simd128 of WebAssembly"
+    if ! command -v node >/dev/null; then
+        skip "vector instructions of WebAssembly" "Node.js is missing and could not be installed"
+    elif ! rustup target add wasm32-wasip1; then
+        skip "vector instructions of WebAssembly" "rustup cannot add wasm32-wasip1"
+    else
+        RUSTFLAGS=$wasm_vectors CARGO_TARGET_WASM32_WASIP1_RUNNER="node $PWD/tests/wasi.mjs" \
+            timeout 900 cargo test -p photoncard-firmware --lib --target wasm32-wasip1 --locked
+    fi
+}
+
 check_test() {
     find_qemu
     find_browser
@@ -226,6 +242,7 @@ check_test() {
         cargo test --workspace --features photoncard/study --locked --lib --bins --tests
     fi
     timeout 900 cargo test --workspace --features photoncard/study --doc --locked
+    test_wasm
 }
 
 check_docs() {
@@ -260,11 +277,14 @@ test_blender() {
     fi
     "$folder/bin/python" -B -m unittest discover --start-directory "$tests" --pattern test_files.py
     PHOTONCARD=$2 "$folder/bin/python" -B "$tests/test_session.py"
-    PHOTONCARD_ZIP=${zip[0]} "$folder/bin/python" -B "$tests/test_blender.py" >"$1/said" 2>&1 || {
-        cat "$1/said" >&2
-        fail "the extension fails in Blender"
-    }
-    tail -3 "$1/said"
+    local name
+    for name in test_blender test_bakes; do
+        PHOTONCARD_ZIP=${zip[0]} "$folder/bin/python" -B "$tests/$name.py" >"$1/said" 2>&1 || {
+            cat "$1/said" >&2
+            fail "the extension fails in Blender"
+        }
+        tail -3 "$1/said"
+    done
 }
 
 # Packages of a release, the package of Python and the extension of Blender: ten minutes, a stage by its name alone.

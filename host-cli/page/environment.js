@@ -2,6 +2,9 @@
 
 import { setText } from "./status.js";
 
+// Whether a file is an environment map, by its name.
+export const isMap = ({ name }) => /\.(hdr|exr)$/i.test(name);
+
 const byId = id => document.getElementById(id);
 // Bytes of a message; the command takes up to 64 KiB.
 const SHARE = 32768;
@@ -15,8 +18,9 @@ export class Surroundings {
     #map = null;
 
     // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind; `told(text)` is shown.
-    constructor({ send, upload, isBusy, told }) {
-        Object.assign(this, { send, upload, isBusy, told });
+    // `takes(files)` tells whether files that are dropped are meant for the scene that is shown.
+    constructor({ send, upload, isBusy, told, takes }) {
+        Object.assign(this, { send, upload, isBusy, told, takes });
         const stage = byId("stage");
         const turn = byId("rotation");
         turn.addEventListener("input", () => setText("degrees", `${turn.value}°`));
@@ -33,7 +37,8 @@ export class Surroundings {
         for (const type of ["dragleave", "drop"]) addEventListener(type, () => stage.classList.remove("target"));
         addEventListener("drop", event => {
             event.preventDefault();
-            if (!byId("map").closest("[inert]")) this.#take(event.dataTransfer.files);
+            const files = [...event.dataTransfer.files];
+            if (this.takes(files) && !byId("map").closest("[inert]")) this.#take(files);
         });
     }
 
@@ -48,7 +53,7 @@ export class Surroundings {
     }
 
     #take(files) {
-        const file = [...files ?? []].find(({ name }) => /\.(hdr|exr)$/i.test(name));
+        const file = [...files ?? []].find(isMap);
         if (!file) return this.told("An environment map is a file .hdr or .exr.");
         if (this.#file) return this.told("Another map is still on its way.");
         this.#announced = this.send({ type: "drop", name: file.name, bytes: file.size });

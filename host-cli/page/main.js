@@ -6,16 +6,18 @@ import { Compare } from "./compare.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { displayOn } from "./display.js";
-import { Surroundings } from "./environment.js";
+import { Surroundings, isMap } from "./environment.js";
 import { Exposure } from "./exposure.js";
 import { element } from "./fields.js";
 import { History } from "./history.js";
 import { Inspector } from "./inspector.js";
+import { LocalHost } from "./local.js";
 import { Overlay } from "./overlay.js";
 import { Pace } from "./pace.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { Saving } from "./saving.js";
+import { Start } from "./start.js";
 import { copy, hint, hush, setText, showStatus, tell } from "./status.js";
 import { decoded, fileOf } from "./tiles.js";
 import { Times } from "./times.js";
@@ -27,6 +29,9 @@ const byId = id => document.getElementById(id);
 
 // What the page that steers may use alone.
 const STEERED = "#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset, #denoise, #rotation, #map, #turntable";
+
+// Cards of a page that has its own host: each is a worker with a card memory of its own.
+const MAX_CARDS = 16;
 
 // What the layers are for those who look at pictures.
 const LAYERS = {
@@ -56,9 +61,12 @@ let drawn = null;
 // Pixel under the pointer; null for none.
 let pointed = null;
 
-const connection = new Connection(
-    `${location.protocol.replace("http", "ws")}//${location.host}/socket${location.search}`,
-    { message: take, tile: takeTile, changed: open => { isOpen = open; show(); } });
+// Whether the host is in this page, or the command at the other end of a socket.
+const hasHost = document.querySelector("meta[name=host]").content === "page";
+const handlers = { message: take, tile: takeTile, changed: open => { isOpen = open; show(); } };
+const connection = hasHost
+    ? new LocalHost({ ...handlers, failed: reason => start.show(reason), said: line => console.info(line) })
+    : new Connection(`${location.protocol.replace("http", "ws")}//${location.host}/socket${location.search}`, handlers);
 const exposure = new Exposure(show);
 const overlay = new Overlay(picture, showLayer);
 
@@ -145,11 +153,23 @@ const surroundings = new Surroundings({
     upload: bytes => connection.upload(bytes),
     isBusy: () => connection.isBusy,
     told: tell,
+    takes: files => !start || byId("start").hidden && files.every(isMap),
 });
+const start = hasHost ? new Start(open) : null;
 const saving = new Saving(fields => asked.saveId = send("", { type: "save", ...fields, ...exposure.asked }));
 
 const isPressed = id => byId(id).getAttribute("aria-pressed") === "true";
 const press = (id, value) => byId(id).setAttribute("aria-pressed", value);
+
+// Begins the view of other files, with the arguments of a view.
+function open(files, words) {
+    scene = state = null;
+    isCameraOwn = false;
+    Object.assign(asked, { layer: "radiance", size: null, started: null, camera: "" });
+    byId("progress").textContent = "Reading the scene.";
+    const cards = Math.max(1, Math.min(navigator.hardwareConcurrency ?? 1, MAX_CARDS));
+    connection.open(files, [...words, "--card", `emulated:${cards}`]);
+}
 
 function take(message) {
     const act = {
@@ -419,6 +439,7 @@ on("inspector", "toggle", () => {
 });
 on("workings", "toggle", ({ target }) => byId("times").hidden = !target.open);
 on("copy-command", "click", ({ target }) => copy(byId("command").textContent, target));
+on("copy-link", "click", ({ target }) => state && copy(`${location.href.split("#")[0]}#${encodeURIComponent(state.command)}`, target));
 on("copy-pose", "click", ({ target }) => camera && copy(pose(camera), target));
 on("toggle", "click", ({ target }) => {
     const isShown = byId("panel").hidden;
@@ -469,9 +490,15 @@ new ResizeObserver(() => {
     resized = setTimeout(fit, 200);
 }).observe(byId("stage"));
 
+if (hasHost) {
+    byId("copy-link").hidden = byId("other-scene").hidden = false;
+    start.show("");
+    navigator.serviceWorker?.register("offline.js").catch(error => console.info(`not offline: ${error.message}`));
+}
+
 // For tests and for whoever looks in the browser's console.
 window.photoncard = {
-    times, picture, view, connection, display, controls, history, zoom, turntable, exposure,
+    times, picture, view, connection, display, start, controls, history, zoom, turntable, exposure,
     get scene() { return scene; },
     get state() { return state; },
     // True if the picture is finished and no change of it is on its way. A change that the command refuses has no answer.

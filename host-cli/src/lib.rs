@@ -13,7 +13,7 @@
 //! | `memory` | free memory of the machine |
 //! | `notices` | contents of a scene that are ignored, missing or interpreted in another way |
 //! | `shell` | quoting of commands |
-//! | `outputs` | checks of output files before any work |
+//! | `outputs`, `picture_files` | checks of output files before any work; pictures as files |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
 //! | `render` (and `prepare`), `measure`, `bake`, `autonomy`, `farm`, `view` | one module for each command |
 //! | `scene`, `documents`, `study` | one module for each command |
@@ -22,40 +22,61 @@
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
 //! from Rust, use `photoncard_driver` directly.
 #![forbid(unsafe_code)]
+#![cfg_attr(target_family = "wasm", expect(dead_code, unused_imports, reason = "a browser has `view` alone"))]
 
 mod arguments;
+#[cfg(not(target_family = "wasm"))]
 mod autonomy;
+#[cfg(not(target_family = "wasm"))]
 mod bake;
+#[cfg(not(target_family = "wasm"))]
 mod card;
 mod console;
+#[cfg(not(target_family = "wasm"))]
 mod documents;
 mod environment;
 mod failure;
+#[cfg(not(target_family = "wasm"))]
 mod farm;
 mod flags;
 #[cfg(target_os = "linux")]
 mod hang_up;
 mod input;
+#[cfg(not(target_family = "wasm"))]
 mod measure;
 mod memory;
 mod notices;
+#[cfg(not(target_family = "wasm"))]
 mod outputs;
+mod picture_files;
+#[cfg(not(target_family = "wasm"))]
 mod pictures;
+#[cfg(not(target_family = "wasm"))]
 mod progress;
+#[cfg(not(target_family = "wasm"))]
 mod render;
 mod report;
+#[cfg(not(target_family = "wasm"))]
 mod scene;
 mod shell;
 #[cfg(feature = "study")]
 mod study;
 mod view;
 
+#[cfg(not(target_family = "wasm"))]
 use std::process::ExitCode;
 
+#[cfg(not(target_family = "wasm"))]
 use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
+#[cfg(not(target_family = "wasm"))]
 use crate::progress::fail_openjd;
 
-#[cfg(not(feature = "study"))]
+/// A view for programs that may not wait: the host in a browser's page.
+pub mod page {
+    pub use crate::view::browser::{Message, PageView};
+}
+
+#[cfg(not(any(feature = "study", target_family = "wasm")))]
 fn without_studies() -> failure::Failure {
     let remedy = "build it with them: cargo build --release -p photoncard --features study";
     failure::Failure::Input(
@@ -63,6 +84,7 @@ fn without_studies() -> failure::Failure {
     )
 }
 
+#[cfg(not(target_family = "wasm"))]
 /// Runs the command that the process's arguments state, and returns the command's exit status. Invalid
 /// arguments end the process with status 2.
 pub fn main() -> ExitCode {

@@ -20,8 +20,11 @@ use crate::arguments::{
 use crate::console::{counted, print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::outputs;
-use crate::render::files::{Form, check_standard_output, denoised, denoised_by, denoiser, write_picture};
-use crate::render::{part, video};
+use crate::picture_files::{
+    Form, denoised, denoised_by, denoiser, needless_part, needless_video, write_picture,
+};
+use crate::render::files::check_standard_output;
+use crate::render::part;
 
 /// Maximum number of missing parts whose commands are printed.
 const MAX_COMMANDS: usize = 100;
@@ -30,10 +33,10 @@ const MAX_COMMANDS: usize = 100;
 pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
     let MergeOptions { parts: paths, pictures, sample_type, tone, denoise, progress } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
-        return Err(part::needless());
+        return Err(needless_part());
     }
     if pictures.iter().any(|picture| picture.format == PictureFormat::Video) {
-        return Err(video::needless());
+        return Err(needless_video());
     }
     check_standard_output(pictures, false, &[*progress == ProgressForm::Openjd])?;
     let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
@@ -95,7 +98,7 @@ fn merge_failure(error: PartError) -> Failure {
 pub(crate) fn mix(options: &MixOptions) -> Result<(), Failure> {
     let MixOptions { input, gains, pictures, tone, denoise } = options;
     for (others, needless) in
-        [(PictureFormat::Part, part::needless as fn() -> Failure), (PictureFormat::Video, video::needless)]
+        [(PictureFormat::Part, needless_part as fn() -> Failure), (PictureFormat::Video, needless_video)]
     {
         if pictures.iter().any(|picture| picture.format == others) {
             return Err(needless());

@@ -17,7 +17,10 @@ const EXCERPT_MARK: usize = 5;
 /// Installs the layout. Lines are broken on a terminal only, so that a path in a log stays in one piece.
 pub(crate) fn lay_out_errors() {
     let build = |_: &_| {
+        #[cfg(not(target_family = "wasm"))]
         let width = terminal_size::terminal_size_of(stderr()).map(|(width, _)| usize::from(width.0));
+        #[cfg(target_family = "wasm")]
+        let width = None;
         let width = width.filter(|_| stderr().is_terminal()).unwrap_or(usize::MAX);
         let has_colours = AutoStream::choice(&stderr()) != ColorChoice::Never;
         Box::new(Layout { width, has_colours }) as Box<dyn ReportHandler>

@@ -16,6 +16,8 @@
 
 mod background;
 mod library;
+#[cfg(target_family = "wasm")]
+mod no_loader;
 mod places;
 
 use std::path::PathBuf;

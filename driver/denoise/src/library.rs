@@ -5,9 +5,12 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::ptr;
 
-use libloading::Library as Loaded;
+#[cfg(not(target_family = "wasm"))]
+use libloading::{Error as LoadError, Library as Loaded};
 use thiserror::Error;
 
+#[cfg(target_family = "wasm")]
+use crate::no_loader::{Error as LoadError, Library as Loaded};
 use crate::places::{FILE, VARIABLE};
 
 /// `OIDN_DEVICE_TYPE_CPU`. A GPU would be faster, but rounds differently and can be busy.
@@ -109,7 +112,7 @@ macro_rules! functions {
         }
 
         impl Library {
-            fn bind(loaded: Loaded) -> Result<Self, libloading::Error> {
+            fn bind(loaded: Loaded) -> Result<Self, LoadError> {
                 // SAFETY: the types are those of `OpenImageDenoise/oidn.h`, which version 2 keeps.
                 $(let $field = unsafe { *loaded.get(concat!("oidn", $name, "\0").as_bytes())? };)*
                 Ok(Self { $($field,)* _loaded: loaded })

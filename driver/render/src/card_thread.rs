@@ -1,4 +1,4 @@
-//! Host thread of a card, which moves bytes between the card's port and its session.
+//! Work of the host on a card, which moves bytes between the card's port and its session.
 
 use std::time::Duration;
 
@@ -24,11 +24,11 @@ struct CardAtWork<'a> {
 /// Loads the card image into a card and renders tiles on the card until all are done. A lost card is greeted
 /// again while other cards render. A card that sends wrong data, or fails repeatedly, is given up. Returns
 /// the time from the start of the crew until the card was loaded; zero if it was not loaded.
-pub(super) fn render_on(
+pub(super) async fn render_on(
     number: CardNumber,
     greeted: &mut GreetedCard,
     job: &Job,
-    crew: &Crew,
+    crew: &Crew<'_>,
 ) -> Result<Duration, RenderError> {
     let _guard = EndOthersOnPanic(&crew.failed);
     greeted.session.start(job.clone(), crew.start.elapsed());
@@ -36,6 +36,7 @@ pub(super) fn render_on(
     let mut loaded = Duration::ZERO;
     while !crew.is_complete()? && !at_work.greeted.card.trace_has_failed() && at_work.go_on()? {
         at_work.tell_progress(&mut loaded, job);
+        crew.hands.pass().await;
     }
     Ok(loaded)
 }
@@ -46,7 +47,7 @@ impl CardAtWork<'_> {
         let Self { number, crew, .. } = *self;
         let dispatcher = &crew.dispatcher;
         dispatcher.supply(number, &mut self.greeted.session, crew.start.elapsed());
-        if self.greeted.session.is_idle() {
+        if self.greeted.session.is_idle() && crew.hands.may_wait() {
             dispatcher.wait(WAIT);
         }
         let slowest = dispatcher.scheduler().slowest(number);

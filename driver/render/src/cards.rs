@@ -1,10 +1,8 @@
 //! Renders tiles on cards: connects to all cards, greets them, and renders on them in parallel. The
 //! connections stay open for the next picture.
 
-use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use photoncard_cards::dispatcher::Dispatcher;
@@ -18,6 +16,7 @@ use photoncard_shared::message::Tile;
 use super::card_thread::render_on;
 use super::crew::Crew;
 use super::greeting::{GreetedCard, GreetingError, greet};
+use super::hands::Hands;
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
 use super::statistics::EARLIER_RENDER;
@@ -34,6 +33,7 @@ const MAX_REST: Duration = Duration::from_secs(5);
 /// Cards that answered the greeting.
 pub(super) struct Cards {
     set: CardSet,
+    hands: Hands,
     cards: Vec<(String, GreetedCard)>,
     /// Emulated cards that were left out of the last picture because of their budget. They are checked again
     /// for the next picture.
@@ -57,7 +57,11 @@ impl Cards {
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
-    pub(super) fn connect(settings: &RenderSettings, observer: &dyn Observer) -> Result<Self, RenderError> {
+    pub(super) async fn connect(
+        settings: &RenderSettings,
+        hands: &Hands,
+        observer: &dyn Observer,
+    ) -> Result<Self, RenderError> {
         let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
         let start = Instant::now();
         let shared = SharedImage::default();
@@ -69,16 +73,20 @@ impl Cards {
         let shared_image = &shared;
         let greetings = each_card.map(|(index, address)| {
             let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
-            move || {
-                let card = OpenCard::open(index, address, model, shared_image, *faults);
-                let greeted = card.map_err(GreetingError::from).and_then(|card| greet(card, start, observer));
+            async move {
+                let card = OpenCard::open(index, address, hands, model, shared_image, *faults);
+                let greeted = match card {
+                    Ok(card) => greet(card, hands, start, observer).await,
+                    Err(error) => Err(error.into()),
+                };
                 (address.name_of(index), greeted)
             }
         });
-        let results = on_threads(greetings);
-        let set = settings.cards.clone();
+        let results = hands.all(greetings).await;
+        let (set, hands) = (settings.cards.clone(), hands.clone());
         let (cards, left_out, known, upload) = (Vec::new(), Vec::new(), Vec::new(), None);
-        let mut this = Self { set, cards, left_out, known, start, shared, upload, lost: 0, used: start };
+        let mut this =
+            Self { set, hands, cards, left_out, known, start, shared, upload, lost: 0, used: start };
         let mut errors = Vec::new();
         for (name, result) in results {
             match result {
@@ -159,12 +167,12 @@ impl Cards {
     }
 
     /// Renders the tiles of a scheduler on all cards and passes them to the sinks.
-    fn render(
+    async fn render(
         &mut self,
         job: &Job,
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
-        outputs: &Outputs,
+        outputs: &Outputs<'_>,
     ) -> Outcome {
         let begun = self.start.elapsed();
         let count = self.cards.len();
@@ -176,6 +184,7 @@ impl Cards {
         let crew = Crew {
             dispatcher: Dispatcher::new(scheduler, sinks).telling(&rendered),
             outputs,
+            hands: &self.hands,
             start: self.start,
             names: &names,
             waits: self.cards.iter().map(|(_, card)| card.card.wait_for_return()).collect(),
@@ -183,10 +192,9 @@ impl Cards {
             failed: AtomicBool::new(false),
         };
         let crew_of_all = &crew;
-        let results = on_threads(
-            (self.cards.iter_mut().enumerate())
-                .map(|(number, (_, card))| move || render_on(number, card, job, crew_of_all)),
-        );
+        let cards = self.cards.iter_mut().enumerate();
+        let works = cards.map(|(number, (_, card))| render_on(number, card, job, crew_of_all));
+        let results = self.hands.all(works).await;
         let ended = self.start.elapsed();
         let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
         let scheduler = crew.dispatcher.scheduler();
@@ -283,7 +291,7 @@ impl Cards {
     /// # Errors
     /// If the trace cannot be written. All other errors are in [`Outcome::failure`], with an outcome that
     /// describes the work until then.
-    pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+    pub(super) async fn run(&mut self, work: Work<'_>) -> Result<Outcome, RenderError> {
         let Work { settings, image, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared card image over their links store no copy of it.
         self.shared.give(image.clone(), None);
@@ -296,7 +304,7 @@ impl Cards {
         if frame.keep_records && frame.first_sample > 0 {
             scheduler = scheduler.with_homes(self.homes());
         }
-        let outcome = self.render(&job, scheduler, sinks, outputs);
+        let outcome = self.render(&job, scheduler, sinks, outputs).await;
         self.used = Instant::now();
         if settings.modelled_caches().is_none() {
             return Ok(outcome);
@@ -304,16 +312,6 @@ impl Cards {
         let traffic = Some(self.finish_models()?);
         Ok(Outcome { traffic, ..outcome })
     }
-}
-
-/// Runs each piece of work on its own thread. Returns the results in the order of the work. Panics if a piece
-/// of work panics.
-pub(super) fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();
-        let join = |thread: ScopedJoinHandle<T>| thread.join().unwrap_or_else(|panic| resume_unwind(panic));
-        threads.into_iter().map(join).collect()
-    })
 }
 
 /// Returns the latest of the times at which the cards were loaded.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use photoncard_cards::dispatcher::Dispatcher;
 use photoncard_cards::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
 
+use super::hands::Hands;
 use super::open_card::WAIT;
 use super::outputs::Outputs;
 use super::{CardError, RenderError};
@@ -14,6 +15,7 @@ use super::{CardError, RenderError};
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
     pub(super) outputs: &'a Outputs<'a>,
+    pub(super) hands: &'a Hands,
     pub(super) start: Instant,
     /// Name of each card in errors.
     pub(super) names: &'a [String],

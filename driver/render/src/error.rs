@@ -162,10 +162,6 @@ pub enum RenderError {
         /// Rectangles of the tiles, `X0,X1,Y0,Y1`, with "and" between them.
         tiles: String,
     },
-    /// The threads of the pilot's chips cannot be started.
-    #[error("the chips could not be started: {0}")]
-    #[diagnostic(help("use fewer cards"))]
-    Chips(rayon::ThreadPoolBuildError),
     /// The partial file cannot be used.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -216,7 +212,6 @@ impl RenderError {
             | Self::KeptDiffers { .. }
             | Self::Unverified { .. }
             | Self::Unrendered { .. }
-            | Self::Chips(_)
             | Self::Stopped => false,
         }
     }

@@ -8,6 +8,7 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::link::{Port, PortError};
 use photoncard_shared::message::{MemoryUse, Tile};
 
+use super::hands::{Hands, completed};
 use super::open_card::{OpenCard, exchange};
 use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
 use crate::emulator::SharedImage;
@@ -100,27 +101,30 @@ pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, R
 
 /// Starts the first emulated card at an address, or connects to the remote card there.
 pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
-    let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
+    let card = OpenCard::open(0, address, &Hands::Threads, None, &SharedImage::default(), None);
     card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
 }
 
 fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
-    greet(card, start, &Unobserved).map_err(|error| error.of_card(address.name_of(0)))
+    let greeted = completed(greet(card, &Hands::Threads, start, &Unobserved));
+    greeted.map_err(|error| error.of_card(address.name_of(0)))
 }
 
 /// Sends the greeting and waits for the reply.
-pub(super) fn greet(
+pub(super) async fn greet(
     mut card: OpenCard,
+    hands: &Hands,
     start: Instant,
     observer: &dyn Observer,
 ) -> Result<GreetedCard, GreetingError> {
-    let (session, budget) = greet_port(&mut card, start, observer)?;
+    let (session, budget) = greet_port(&mut card, hands, start, observer).await?;
     Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
 }
 
 /// Greets the card at the other end of a port, as [`greet`] does.
-pub(super) fn greet_port(
+pub(super) async fn greet_port(
     port: &mut impl Port,
+    hands: &Hands,
     start: Instant,
     observer: &dyn Observer,
 ) -> Result<(Session, Budget), GreetingError> {
@@ -136,6 +140,7 @@ pub(super) fn greet_port(
             SessionError::Port(PortError::Closed) => CardError::Refused,
             error => CardError::Session(error),
         })?;
+        hands.pass().await;
     }
 }
 

@@ -3,13 +3,12 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use photoncard_cards::link::{
-    FaultInjector, LineFaults, LinkError, RemoteAddress, connect_tcp, connect_unix, open_serial,
-};
+use photoncard_cards::link::{FaultInjector, LineFaults, LinkError, RemoteAddress, reach};
 use photoncard_cards::session::{Session, SessionError};
 use photoncard_shared::link::{Port, PortError};
 
 use super::address::CardAddress;
+use super::hands::Hands;
 use super::{CardError, RenderError};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 
@@ -24,6 +23,8 @@ pub(super) struct OpenCard {
 
 enum Connection {
     Emulated(EmulatedCard),
+    /// Port of an emulated card outside this program.
+    Worker(BoxedPort),
     /// Port of a remote card; `None` while the link is closed. The port is closed before it is reopened,
     /// because a device may allow only one user at a time.
     Remote {
@@ -39,15 +40,22 @@ impl OpenCard {
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
+        hands: &Hands,
         model: Option<MemoryModel>,
         shared: &SharedImage,
         faults: Option<LineFaults>,
     ) -> Result<Self, CardError> {
         let connection = match address {
-            CardAddress::Emulated { model: chip, memory, .. } => Connection::Emulated(
-                EmulatedCard::start(chip.kind().emulated().with_memory(*memory), model, shared.clone())
-                    .map_err(CardError::Start)?,
-            ),
+            CardAddress::Emulated { model: chip, memory, .. } => {
+                let chip = chip.kind().emulated().with_memory(*memory);
+                match hands {
+                    Hands::Threads => {
+                        EmulatedCard::start(chip, model, shared.clone()).map(Connection::Emulated)
+                    }
+                    Hands::Turns(workers) => workers.start(index, chip).map(Connection::Worker),
+                }
+                .map_err(CardError::Start)?
+            }
             CardAddress::Remote(address) => {
                 Connection::Remote { address: address.clone(), port: Some(reach(address)?) }
             }
@@ -57,14 +65,14 @@ impl OpenCard {
 
     /// Returns whether the card is emulated in this process.
     pub(super) fn is_emulated(&self) -> bool {
-        matches!(self.connection, Connection::Emulated(_))
+        matches!(self.connection, Connection::Emulated(_) | Connection::Worker(_))
     }
 
     /// Closes the link to a remote card, and returns the address at which it can be reopened. Returns `None`
     /// for an emulated card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {
-            Connection::Emulated(_) => None,
+            Connection::Emulated(_) | Connection::Worker(_) => None,
             Connection::Remote { address, port } => {
                 drop(port.take());
                 Some(address.clone())
@@ -75,7 +83,7 @@ impl OpenCard {
     /// Time for which a render without any other card waits for this card to come back after a loss.
     pub(super) fn wait_for_return(&self) -> Duration {
         match &self.connection {
-            Connection::Emulated(_) => Duration::ZERO,
+            Connection::Emulated(_) | Connection::Worker(_) => Duration::ZERO,
             Connection::Remote { address, .. } => address.wait_for_return(),
         }
     }
@@ -92,7 +100,7 @@ impl OpenCard {
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
             Connection::Emulated(card) => card.take_empty_memory(),
-            Connection::Remote { .. } => None,
+            Connection::Worker(_) | Connection::Remote { .. } => None,
         }
     }
 
@@ -105,7 +113,7 @@ impl OpenCard {
     pub(super) fn tile_lines(&self) -> TileLines {
         match &self.connection {
             Connection::Emulated(card) => card.tile_lines().clone(),
-            Connection::Remote { .. } => TileLines::default(),
+            Connection::Worker(_) | Connection::Remote { .. } => TileLines::default(),
         }
     }
 
@@ -114,7 +122,7 @@ impl OpenCard {
     pub(super) fn finish(self) -> Option<MemoryRecord> {
         match self.connection {
             Connection::Emulated(card) => card.finish(),
-            Connection::Remote { .. } => None,
+            Connection::Worker(_) | Connection::Remote { .. } => None,
         }
     }
 }
@@ -123,6 +131,7 @@ impl Connection {
     fn port(&mut self) -> Result<&mut dyn Port, PortError> {
         match self {
             Self::Emulated(card) => Ok(card.port()),
+            Self::Worker(port) => Ok(port.as_mut()),
             Self::Remote { port, .. } => match port {
                 Some(port) => Ok(port.as_mut()),
                 None => Err(PortError::Closed),
@@ -148,18 +157,6 @@ impl Port for OpenCard {
             Some(injector) => injector.write(port, bytes, wait),
         }
     }
-}
-
-pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
-    match address {
-        RemoteAddress::Serial { path, baud, options } => open_serial(path, *baud, *options).map(boxed),
-        RemoteAddress::Tcp { host, port } => connect_tcp(host, *port).map(boxed),
-        RemoteAddress::Unix { path } => connect_unix(path).map(boxed),
-    }
-}
-
-fn boxed(port: impl Port + Send + 'static) -> BoxedPort {
-    Box::new(port)
 }
 
 /// Maximum time that a port waits for a byte. After a render is stopped, the thread of a card notices it

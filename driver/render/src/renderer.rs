@@ -13,6 +13,7 @@ use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
+use super::hands::{ChipWorkers, Hands, completed};
 use super::measure::Sensors;
 use super::outputs::Outputs;
 use super::work::{BudgetCheck, FitChips, Prepared, Times, Work, prepare};
@@ -66,12 +67,19 @@ struct Request<'a> {
 pub struct Renderer {
     cards: Option<Cards>,
     kept: Option<Kept>,
+    hands: Hands,
 }
 
 impl Renderer {
     /// Creates a renderer with the card image of a prepared scene.
     pub(super) fn with_image(kept: Kept) -> Self {
-        Self { cards: None, kept: Some(kept) }
+        Self { kept: Some(kept), ..Self::default() }
+    }
+
+    /// Creates a renderer whose emulated cards are started by `workers`, and whose thread does not wait:
+    /// [`Self::picture`] pends where it would.
+    pub fn with_workers(workers: Arc<dyn ChipWorkers>) -> Self {
+        Self { hands: Hands::Turns(workers), ..Self::default() }
     }
 
     /// Renders a picture of a scene. If only the camera differs from the last picture, triangles and texels
@@ -85,7 +93,23 @@ impl Renderer {
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Request::default(), observer)
+        completed(self.picture(scene, settings, None, observer))
+    }
+
+    /// Renders a picture, as [`Self::render`] does, or as [`Self::refine`] with `base`. The future pends only
+    /// if the renderer has [workers](Self::with_workers): it is then to be polled again whenever bytes have
+    /// arrived at a port, and after some milliseconds without any.
+    ///
+    /// # Errors
+    /// As [`Self::render`] and [`Self::refine`].
+    pub async fn picture(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        base: Option<Arc<Film>>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, Request { base, ..Request::default() }, observer).await
     }
 
     /// Adds samples to the picture `base`. Renders the samples that `base` lacks, and returns the picture
@@ -103,7 +127,7 @@ impl Renderer {
         base: Arc<Film>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Request { base: Some(base), ..Request::default() }, observer)
+        completed(self.picture(scene, settings, Some(base), observer))
     }
 
     /// Closes the cards. The next picture connects to them again, including lost ones.
@@ -123,7 +147,8 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_by(scene, settings, Request { choose: Some(choose), ..Request::default() }, observer)
+        let request = Request { choose: Some(choose), ..Request::default() };
+        completed(self.render_by(scene, settings, request, observer))
     }
 
     /// Renders a picture whose pixels are sensors.
@@ -138,36 +163,37 @@ impl Renderer {
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
         let request = Request { sensors: Some(sensors), base, ..Request::default() };
-        self.render_by(scene, settings, request, observer)
+        completed(self.render_by(scene, settings, request, observer))
     }
 
-    fn render_by(
+    async fn render_by(
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
-        request: Request,
+        request: Request<'_>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        let result = self.render_on_cards(scene, settings, request, observer);
+        let result = self.render_on_cards(scene, settings, request, observer).await;
         if matches!(&result, Err(error) if !error.is_input() && !matches!(error, RenderError::Stopped)) {
             self.cards = None;
         }
         result
     }
 
-    fn render_on_cards(
+    async fn render_on_cards(
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
-        Request { choose, base, sensors }: Request,
+        Request { choose, base, sensors }: Request<'_>,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         settings.check_groups_of(scene)?;
         let camera = settings.camera(scene)?;
         settings.check()?;
-        let Self { cards, kept } = self;
-        let cards = connected(cards, settings, observer)?;
+        let Self { cards, kept, hands } = self;
+        check_model(settings, hands)?;
+        let cards = connected(cards, settings, hands, observer).await?;
         let needed = settings.needed_cards();
         cards.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
         settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
@@ -208,7 +234,7 @@ impl Renderer {
         let sinks = outputs.sinks(&film);
         let work = Work { settings, image, frame: &frame, tiles, film: &film, sinks, outputs: &outputs };
         let budgets = cards.budgets();
-        let mut outcome = cards.run(work).inspect_err(|_| outputs.report_kept())?;
+        let mut outcome = cards.run(work).await.inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
         times.total = start.elapsed().as_secs_f64();
@@ -226,7 +252,8 @@ impl Renderer {
         let identities = identities.filter(|_| settings.picture.layers.have_mattes());
         let mut rendering = Rendering { film, identities, illuminance: None, statistics, partial };
         if settings.picture.layers.have_illuminance() {
-            self.add_illuminance(scene, settings, &mut rendering, observer)?;
+            // A frame of its own, in this function again.
+            Box::pin(self.illuminate(scene, settings, &mut rendering, observer)).await?;
         }
         Ok(rendering)
     }
@@ -237,6 +264,16 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render`].
     pub(super) fn add_illuminance(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        rendering: &mut Rendering,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        completed(self.illuminate(scene, settings, rendering, observer))
+    }
+
+    async fn illuminate(
         &mut self,
         scene: &Scene,
         settings: &RenderSettings,
@@ -256,7 +293,7 @@ impl Renderer {
             rendering.illuminance = Some(of_film(&rendering.film));
             return Ok(());
         }
-        let of_irradiance = self.render_on_cards(scene, &settings, Request::default(), observer)?;
+        let of_irradiance = self.render_on_cards(scene, &settings, Request::default(), observer).await?;
         rendering.illuminance = Some(of_film(&of_irradiance.film));
         rendering.statistics.time_s += of_irradiance.statistics.time_s;
         Ok(())
@@ -284,10 +321,22 @@ fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     }
 }
 
+/// Checks that the memory of chips outside this program is not to be modelled.
+fn check_model(settings: &RenderSettings, hands: &Hands) -> Result<(), RenderError> {
+    let Some(caches) = settings.modelled_caches().filter(|_| !hands.may_wait()) else { return Ok(()) };
+    Err(RenderError::Setting {
+        field: "cards.caches",
+        value: caches.to_string(),
+        reason: "the memory of chips in workers is not modelled".into(),
+        remedy: "leave it out, or use the command `photoncard`".into(),
+    })
+}
+
 /// Returns the open cards if the settings have the same cards, otherwise newly connected cards.
-fn connected<'c>(
+async fn connected<'c>(
     cards: &'c mut Option<Cards>,
     settings: &RenderSettings,
+    hands: &Hands,
     observer: &dyn Observer,
 ) -> Result<&'c mut Cards, RenderError> {
     // The open cards are closed before new ones are connected, because a card serves one host at a time.
@@ -297,7 +346,7 @@ fn connected<'c>(
             open.take_back();
             open
         }
-        None => Cards::connect(settings, observer)?,
+        None => Cards::connect(settings, hands, observer).await?,
     }))
 }
 

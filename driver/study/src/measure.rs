@@ -204,7 +204,8 @@ impl Bench<'_> {
         model: Option<TileMemory>,
     ) -> Result<Vec<RenderedTile>, RenderError> {
         let image = &self.mapped.image;
-        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, model, self.is_stopped)?)
+        let work = || render_tiles_apart(chip, image, frame, tiles, model, self.is_stopped);
+        Ok(self.pool.install(work)?)
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. If a chip has several

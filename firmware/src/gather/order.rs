@@ -42,7 +42,7 @@ impl HilbertCode {
     }
 
     /// Number, below `1 << bits`, of the part of the curve that contains the position, if the curve is
-    /// divided into parts that are equally long; `bits` is below 64.
+    /// divided into parts that are equally long; `bits` is below 64, and at most those of a `usize`.
     pub const fn part(self, bits: u32) -> usize {
         (self.0 >> 1 >> (u64::BITS - 1 - bits)) as usize
     }
@@ -240,7 +240,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_parts_of_the_curve_are_equally_long(code: u64, bits in 0..64_u32) {
+        fn the_parts_of_the_curve_are_equally_long(code: u64, bits in 0..64.min(usize::BITS)) {
             let length = 1_u128 << (64 - bits);
             prop_assert_eq!(HilbertCode::of_bits(code).part(bits) as u128, u128::from(code) / length);
         }

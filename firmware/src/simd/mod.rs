@@ -1,12 +1,15 @@
-//! Vector instructions on sixteen lanes, selected at run time.
+//! Vector instructions on sixteen lanes, selected at run time; of WebAssembly, when it is compiled.
 //!
 //! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same operation. It is compiled
-//! for each [`Isa`] that the processor may have. Compilers turn the loops into vector instructions;
+//! for each [`Isa`] that the processor may have. A WebAssembly program cannot ask: with `simd128` the whole
+//! program needs it, and a browser that lacks it refuses the program. Compilers turn the loops into vector instructions;
 //! operations that they do not recognise in loops, such as comparing and packing lanes, are methods of the
 //! `Isa`. Every lane rounds like scalar code and no operations are fused, so that all instruction sets give
 //! the same bits. [`Portable`] is the fallback for every processor.
 
 mod kernel;
+#[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+mod wasm;
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
 #[expect(
     unsafe_code,
@@ -21,7 +24,12 @@ pub use self::kernel::{HALF_LANES, Isa, Kernel, LANES, Portable};
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     return x86::run(kernel);
-    #[cfg(not(all(target_arch = "x86_64", target_feature = "sse2")))]
+    #[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+    return kernel.run(wasm::Simd128);
+    #[cfg(not(any(
+        all(target_arch = "x86_64", target_feature = "sse2"),
+        all(target_family = "wasm", target_feature = "simd128")
+    )))]
     kernel.run(Portable)
 }
 
@@ -36,6 +44,9 @@ pub enum Level {
     /// AVX-512 of x86-64.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Avx512,
+    /// `simd128` of WebAssembly.
+    #[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+    Simd128,
 }
 
 impl Level {
@@ -43,7 +54,13 @@ impl Level {
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     pub const ALL: &[Self] = &[Self::Portable, Self::Avx2, Self::Avx512];
     /// All instruction sets of this architecture.
-    #[cfg(not(all(target_arch = "x86_64", target_feature = "sse2")))]
+    #[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+    pub const ALL: &[Self] = &[Self::Portable, Self::Simd128];
+    /// All instruction sets of this architecture.
+    #[cfg(not(any(
+        all(target_arch = "x86_64", target_feature = "sse2"),
+        all(target_family = "wasm", target_feature = "simd128")
+    )))]
     pub const ALL: &[Self] = &[Self::Portable];
 
     /// Runs a kernel with this instruction set; `None` if the processor lacks it.
@@ -54,6 +71,8 @@ impl Level {
             Self::Avx2 => x86::run_with_avx2(kernel),
             #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
             Self::Avx512 => x86::run_with_avx512(kernel),
+            #[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+            Self::Simd128 => Some(kernel.run(wasm::Simd128)),
         }
     }
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import bpy
 import gpu
@@ -12,7 +12,7 @@ import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
 from . import command, events, exr
-from .baking import bake_world
+from .baking import BakeCancelledError, Baked, BakeError, BakeJob, bake_materials, bake_world
 from .export.camera import CameraError, frame_of
 from .export.objects import Exported, export
 from .glb import TooLarge
@@ -130,13 +130,29 @@ class _Picture:
         program = command.find(program_stated(), os.path.dirname(__file__))
         engine.update_stats("", "Exporting the scene")
         camera = engine.camera_override or self._scene.camera
-        exported = export(
-            self._depsgraph, camera, self._frame, bake_world if self._scene.photoncard.use_bake else None
-        )
+        stated = self._scene.photoncard
+        try:
+            exported = export(
+                self._depsgraph,
+                camera,
+                self._frame,
+                self._bake_world if stated.use_bake else None,
+                self._bake_materials if stated.use_material_bake else None,
+            )
+        except BakeCancelledError:
+            return
         for line in exported.notices.lines():
             engine.report({"WARNING"}, line)
         with tempfile.TemporaryDirectory(prefix="photoncard-", dir=bpy.app.tempdir) as folder:
             self._render_in(folder, program, exported)
+
+    def _bake_world(self, world: bpy.types.World) -> np.ndarray:
+        return bake_world(world, self._is_cancelled)
+
+    def _bake_materials(self, jobs: Sequence[BakeJob], folder: str) -> list[Baked | BakeError]:
+        self._engine.update_stats("", "Baking materials")
+        size, frame = self._scene.photoncard.bake_size, self._scene.frame_current
+        return bake_materials(jobs, folder, size, frame, self._is_cancelled)
 
     def _render_in(self, folder: str, program: str, exported: Exported) -> None:
         output = os.path.join(folder, "picture.exr")

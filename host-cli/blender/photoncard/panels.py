@@ -123,6 +123,22 @@ class PHOTONCARD_PT_film(_Panel, bpy.types.Panel):
         layout.prop(context.scene.photoncard, "use_bake")
 
 
+class PHOTONCARD_PT_materials(_Panel, bpy.types.Panel):
+    """Bakes of materials."""
+
+    bl_label = "Materials"
+    bl_context = "render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Shows the settings."""
+        layout, settings = self._split(), context.scene.photoncard
+        layout.prop(settings, "use_material_bake")
+        column = layout.column()
+        column.active = settings.use_material_bake
+        column.prop(settings, "bake_size")
+
+
 class PHOTONCARD_PT_passes(_Panel, bpy.types.Panel):
     """Passes."""
 
@@ -187,6 +203,7 @@ CLASSES = (
     PHOTONCARD_PT_sampling,
     PHOTONCARD_PT_cards,
     PHOTONCARD_PT_film,
+    PHOTONCARD_PT_materials,
     PHOTONCARD_PT_passes,
     PHOTONCARD_PT_object,
     PHOTONCARD_PT_world,

@@ -74,6 +74,20 @@ class SceneSettings(bpy.types.PropertyGroup):
         description="Render a Sky Texture and other nodes of the world to a map by Cycles before each frame",
         default=True,
     )
+    use_material_bake: BoolProperty(
+        name="Bake Procedural Materials",
+        description="Bake procedural textures, bumps and other nodes of materials to images by Cycles before "
+        "each frame",
+        default=False,
+    )
+    bake_size: IntProperty(
+        name="Resolution",
+        description="Texels a side of the images of each material on each mesh",
+        default=1024,
+        min=16,
+        max=8192,
+        subtype="PIXEL",
+    )
     cards: CollectionProperty(type=Card)
 
     def command_settings(self, size: tuple[int, int]) -> Settings:

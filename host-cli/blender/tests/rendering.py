@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from photoncard import exr  # noqa: E402
+from photoncard import exr, png  # noqa: E402
 
 
 def passes(scene: bpy.types.Scene, engine: str, folder: Path) -> dict[str, np.ndarray]:
@@ -48,14 +48,14 @@ def use_cycles(scene: bpy.types.Scene, samples: int) -> None:
 
 
 def save_png(path: Path, *pictures: np.ndarray) -> None:
-    """Writes pictures side by side as sRGB, with one exposure."""
-    from photoncard import png
+    """Writes pictures side by side as sRGB, with the exposure of the last."""
+    path.write_bytes(png.encode(np.concatenate([shown(each, pictures[-1]) for each in pictures], axis=1)))
 
-    joined = np.concatenate(pictures, axis=1)
-    exposed = joined * (0.5 / max(float(np.median(pictures[-1][pictures[-1] > 0])), 1e-6) * 0.4)
-    encoded = np.clip(
-        np.where(exposed <= 0.0031308, exposed * 12.92, 1.055 * np.maximum(exposed, 0) ** (1 / 2.4) - 0.055),
-        0,
-        1,
+
+def shown(picture: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """A picture in sRGB of 8 bits, with an exposure by the median of another."""
+    exposed = picture * (0.2 / max(float(np.median(like[like > 0])), 1e-6))
+    encoded = np.where(
+        exposed <= 0.0031308, exposed * 12.92, 1.055 * np.maximum(exposed, 0) ** (1 / 2.4) - 0.055
     )
-    path.write_bytes(png.encode(np.rint(encoded * 255).astype(np.uint8)))
+    return np.rint(np.clip(encoded, 0, 1) * 255).astype(np.uint8)

@@ -18,8 +18,8 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::farm;
 use crate::notices::{self, Uses};
+use crate::picture_files::denoiser;
 use crate::progress::Progress;
-use crate::render::files::denoiser;
 use crate::render::{assigned, dram_bytes, on_threads};
 use crate::{input, outputs};
 

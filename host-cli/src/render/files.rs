@@ -2,29 +2,20 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::cryptomatte::Identities;
-use photoncard_driver::denoise::Denoiser;
-use photoncard_driver::exr::{self, Content, SampleFormat};
-use photoncard_driver::film::Film;
-use photoncard_driver::layer::Layers;
 use photoncard_driver::output;
 use photoncard_driver::partial::PartialError;
-use photoncard_driver::parts::{self, PartHead};
+use photoncard_driver::parts::PartHead;
 use photoncard_driver::render::Rendering;
-use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
-use serde_json::Value;
 
-use super::{part, video};
-use crate::arguments::{
-    OutputOptions, PictureFormat, PictureOutput, ProgressForm, RenderOptions, TextOutput, numbered,
-};
-use crate::console::{print_json, printable_json, say, write_bytes};
+use super::part;
+use crate::arguments::{OutputOptions, PictureOutput, ProgressForm, RenderOptions, TextOutput, numbered};
+use crate::console::{print_json, printable_json, say};
 use crate::failure::Failure;
 use crate::input;
+use crate::picture_files::{Form, denoised, denoised_by, denoiser, write_picture};
 
 /// Checks that all files can be written, that none is an input or another output, and that no file with
 /// finished tiles of an earlier render is overwritten.
@@ -154,120 +145,5 @@ pub(super) fn write_statistics(
         TextOutput::StandardOutput => print_json(&text),
         TextOutput::File(path) => output::write(path, (printable_json(&text) + "\n").as_bytes())
             .map_err(|error| Failure::work_error(&error)),
-    }
-}
-
-/// Returns the denoiser if `is_asked`, else `None`. Open Image Denoise is loaded once per process.
-pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Failure> {
-    static FOUND: OnceLock<Denoiser> = OnceLock::new();
-    if !is_asked {
-        return Ok(None);
-    }
-    if FOUND.get().is_none() {
-        let _ = FOUND.set(Denoiser::find().map_err(|error| Failure::input_error(&error))?);
-    }
-    Ok(FOUND.get())
-}
-
-/// Entry of a picture's provenance for the denoiser: the name `denoise` and the denoiser's version.
-pub(crate) fn denoised_by(denoiser: &Denoiser) -> (String, Value) {
-    ("denoise".to_owned(), Value::from(denoiser.version()))
-}
-
-/// Denoised radiance of a film, if there is a denoiser. In a transparent picture, pixels without a surface
-/// stay black.
-pub(crate) fn denoised(
-    denoiser: Option<&Denoiser>,
-    film: &Film,
-    is_transparent: bool,
-    threads: Option<usize>,
-) -> Result<Option<Vec<[f32; 3]>>, Failure> {
-    let radiance = denoiser.map(|denoiser| denoiser.radiance(film, threads, &|| false)).transpose();
-    let mut radiance = radiance.map_err(|error| Failure::work_error(&error))?;
-    if is_transparent && let Some(radiance) = &mut radiance {
-        let uncovered = film.all().zip(radiance).filter(|(pixel, _)| pixel.alpha == 0.0);
-        uncovered.for_each(|(_, radiance)| *radiance = [0.0; 3]);
-    }
-    Ok(radiance)
-}
-
-/// Data that a picture's file has besides the film. Each format uses some of them.
-pub(crate) struct Form {
-    /// Layers of an EXR.
-    pub(crate) layers: Layers,
-    /// True if the files have alpha.
-    pub(crate) is_transparent: bool,
-    /// Names for the mattes of an EXR; `None` without mattes.
-    pub(crate) identities: Option<Arc<Identities>>,
-    /// Illuminance for an EXR, lx; `None` without that layer.
-    pub(crate) illuminance: Option<Vec<f32>>,
-    /// Type of an EXR's samples.
-    pub(crate) sample_type: SampleFormat,
-    /// Tone mapping of a PNG.
-    pub(crate) tone: ToneMapping,
-    /// Denoised radiance: a layer of an EXR, and what a PNG shows.
-    pub(crate) denoised: Option<Vec<[f32; 3]>>,
-    /// Header of a file with one part of a picture; `None` for a whole picture.
-    pub(crate) part: Option<PartHead>,
-}
-
-impl Form {
-    /// Contents of an EXR of `film`.
-    pub(crate) fn content<'a>(&'a self, film: &'a Film) -> Content<'a> {
-        let Self { layers, is_transparent, identities, illuminance, denoised, .. } = self;
-        Content {
-            film,
-            layers,
-            denoised: denoised.as_deref(),
-            is_transparent: *is_transparent,
-            identities: identities.as_deref(),
-            illuminance: illuminance.as_deref(),
-        }
-    }
-}
-
-/// Encodes an EXR or a PNG with its provenance. `path` is the file's name in errors.
-pub(crate) fn picture_bytes(
-    path: &Path,
-    format: PictureFormat,
-    film: &Film,
-    provenance: &str,
-    form: &Form,
-) -> Result<Vec<u8>, Failure> {
-    if format == PictureFormat::Exr {
-        let bytes = exr::bytes(path, &form.content(film), provenance, form.sample_type);
-        return bytes.map_err(|error| Failure::work_error(&error));
-    }
-    let size = [film.window().width(), film.window().height()];
-    let denoised = form.denoised.as_deref();
-    let radiance = film.pixels().enumerate().map(|(index, pixel)| {
-        denoised.and_then(|denoised| denoised.get(index)).copied().unwrap_or(pixel.radiance)
-    });
-    let alpha = form.is_transparent.then(|| film.all().map(|pixel| pixel.alpha).collect::<Vec<_>>());
-    let bytes = png_bytes(path, size, radiance, alpha.as_deref(), form.tone, Some(provenance));
-    bytes.map_err(|error| Failure::work_error(&error))
-}
-
-/// Writes a picture with its provenance. If it fails, an existing file stays unchanged.
-pub(crate) fn write_picture(
-    picture: &PictureOutput,
-    film: &Film,
-    provenance: &str,
-    form: &Form,
-) -> Result<(), Failure> {
-    let PictureOutput { path, format } = picture;
-    match format {
-        PictureFormat::Exr | PictureFormat::Png => {
-            let bytes = picture_bytes(path, *format, film, provenance, form)?;
-            match picture.file() {
-                None => write_bytes(&bytes),
-                Some(path) => output::write(path, &bytes).map_err(|error| Failure::work_error(&error)),
-            }
-        }
-        PictureFormat::Video => Err(video::needless()),
-        PictureFormat::Part => {
-            let head = form.part.as_ref().ok_or_else(part::needless)?;
-            parts::write(path, head, film).map_err(Failure::work)
-        }
     }
 }

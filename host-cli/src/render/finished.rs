@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::{files, messages};
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
+use crate::picture_files::{denoised_by, denoiser};
 
 /// Settings that a render computes if they are not stated, and then writes into the provenance.
 const FOUND: [&str; 2] = ["max-distance", "view"];
@@ -37,8 +38,8 @@ pub(super) fn is_finished(
     let mut stated = settings.identity(scene);
     stated.extend(settings.picture.of_layers());
     stated.extend(inputs.clone());
-    match files::denoiser(files::denoises(options, outputs)) {
-        Ok(denoiser) => stated.extend(denoiser.map(files::denoised_by)),
+    match denoiser(files::denoises(options, outputs)) {
+        Ok(denoiser) => stated.extend(denoiser.map(denoised_by)),
         Err(_) => return false,
     }
     let found: Vec<&str> =

@@ -7,6 +7,7 @@ use photoncard_driver::parts::{Part, PartHead};
 
 use crate::arguments::{PictureFormat, PictureOutput};
 use crate::failure::Failure;
+use crate::picture_files::needless_part;
 use crate::shell;
 
 /// Checks that a render with `--part` has one output, a part file, and that any other render has no part
@@ -18,17 +19,9 @@ pub(super) fn check(part: Option<Part>, pictures: &[PictureOutput]) -> Result<()
             format!("the part {part} of a picture is written to one file OUT.part"),
             "give -o a name that ends in .part; photoncard merge writes the picture of all parts",
         )),
-        None if are_parts => Err(needless()),
+        None if are_parts => Err(needless_part()),
         _ => Ok(()),
     }
-}
-
-/// Error of a part file as the output of a render without `--part`.
-pub(crate) fn needless() -> Failure {
-    refusal(
-        "a file OUT.part is a part of a picture".to_owned(),
-        "give --part K/N to photoncard render, or -o a name that ends in .exr or .png",
-    )
 }
 
 fn refusal(text: String, help: &str) -> Failure {

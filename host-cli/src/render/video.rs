@@ -140,14 +140,6 @@ impl Video {
     }
 }
 
-/// Error of a video as the output of a command without frames.
-pub(crate) fn needless() -> Failure {
-    refusal(
-        "a video is of frames that photoncard render makes".to_owned(),
-        "give photoncard render --frames A-B, or -o a name that ends in .exr or .png",
-    )
-}
-
 fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }

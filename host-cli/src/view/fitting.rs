@@ -31,15 +31,14 @@ impl Fitting {
     /// If the thread cannot be started.
     pub(super) fn start(
         scene: Arc<Scene>,
-        (quality, finish): (Quality, Finish),
+        by: (Quality, Finish),
         settings: RenderSettings,
         threads: Option<usize>,
     ) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let observer = Stop(stop.clone());
         let work = move || {
-            let fit =
-                || quality.fit((finish, None), (&scene, &PackedScene::new(&scene)?), &settings, &observer);
+            let fit = || find(&scene, by, &settings, &observer);
             let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
             match pool {
                 Some(Ok(pool)) => pool.install(fit),
@@ -66,6 +65,16 @@ impl Fitting {
         // A panic of the thread concerns only its result, which is dropped.
         let _ = self.thread.join();
     }
+}
+
+/// Settings that a quality chooses for a scene and the camera of `settings`, by pilot renders on this thread.
+pub(super) fn find(
+    scene: &Scene,
+    (quality, finish): (Quality, Finish),
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Found {
+    quality.fit((finish, None), (scene, &PackedScene::new(scene)?), settings, observer)
 }
 
 struct Stop(Arc<AtomicBool>);

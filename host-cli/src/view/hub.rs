@@ -11,7 +11,7 @@ use photoncard_driver::exr::mix::{Gain, Mix, MixError};
 use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
 use photoncard_driver::output;
-use photoncard_driver::render::{NamedSettings, Rendering};
+use photoncard_driver::render::{NamedSettings, Rendering, turn};
 use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
 use serde_json::json;
 
@@ -24,7 +24,7 @@ use super::wish::Wish;
 use crate::arguments::PictureFormat;
 use crate::console::printable_json;
 use crate::failure::Failure;
-use crate::render::files::{Form, picture_bytes};
+use crate::picture_files::{Form, picture_bytes};
 
 /// Final picture of a request, equal to that of `photoncard render`. Pages can save it.
 pub(super) struct Settled {
@@ -57,6 +57,8 @@ pub(super) struct Hub {
     /// Folder of saved pictures, locked while a picture is written.
     folder: Mutex<Option<Folder>>,
     start: Instant,
+    /// False if this thread serves the pages too, and may not wait for them.
+    may_wait: bool,
 }
 
 impl Hub {
@@ -70,7 +72,18 @@ impl Hub {
             settled: Mutex::new(None),
             folder: Mutex::new(folder),
             start: Instant::now(),
+            may_wait: true,
         }
+    }
+
+    /// Makes the painter pend where it would wait.
+    pub(super) fn without_waits(self) -> Self {
+        Self { may_wait: false, ..self }
+    }
+
+    /// Returns whether the painter may wait.
+    pub(super) fn may_wait(&self) -> bool {
+        self.may_wait
     }
 
     fn lock(&self) -> MutexGuard<'_, View> {
@@ -101,27 +114,47 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Waits for the next work of the painter; `None` when the view is over.
-    pub(super) fn next_job(&self) -> Option<Job> {
+    /// Waits for the next work of the painter; `None` when the view is over. Pends where it may not wait.
+    pub(super) async fn next_job(&self) -> Option<Job> {
+        if self.may_wait {
+            return self.wait_for_job();
+        }
+        while !self.is_over() {
+            if let Ok(job) = self.look_for_job(&mut self.lock()) {
+                return Some(job);
+            }
+            turn().await;
+        }
+        None
+    }
+
+    fn wait_for_job(&self) -> Option<Job> {
         /// Interval of checks whether the view is over: a signal does not notify the condition variable.
         const ATTENTION: Duration = Duration::from_millis(100);
         let mut view = self.lock();
         while !self.is_over() {
-            let now = self.start.elapsed();
-            if view.takes_reload() {
-                self.must_stop.store(view.must_stop(), Ordering::Relaxed);
-                return Some(Job::Reload);
-            }
-            let wait = match view.next(now) {
-                Ok(task) => {
-                    self.must_stop.store(false, Ordering::Relaxed);
-                    return Some(Job::Pass(Box::new(task)));
+            match self.look_for_job(&mut view) {
+                Ok(job) => return Some(job),
+                Err(wait) => {
+                    let wait = wait.map_or(ATTENTION, |wait| wait.min(ATTENTION));
+                    view = self.changed.wait_timeout(view, wait).unwrap_or_else(PoisonError::into_inner).0;
                 }
-                Err(until) => until.map_or(ATTENTION, |until| until.saturating_sub(now).min(ATTENTION)),
-            };
-            view = self.changed.wait_timeout(view, wait).unwrap_or_else(PoisonError::into_inner).0;
+            }
         }
         None
+    }
+
+    /// Returns the next work of the painter, or the time until there may be some; `Err(None)` if a change has
+    /// to come first.
+    fn look_for_job(&self, view: &mut View) -> Result<Job, Option<Duration>> {
+        let now = self.start.elapsed();
+        if view.takes_reload() {
+            self.must_stop.store(view.must_stop(), Ordering::Relaxed);
+            return Ok(Job::Reload);
+        }
+        let task = view.next(now).map_err(|until| until.map(|until| until.saturating_sub(now)))?;
+        self.must_stop.store(false, Ordering::Relaxed);
+        Ok(Job::Pass(Box::new(task)))
     }
 
     /// Keeps a final picture, so that pages can save it.

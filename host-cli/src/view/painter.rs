@@ -8,14 +8,14 @@ use std::time::Duration;
 use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
 use photoncard_driver::quality::{Finish, Quality};
-use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering};
+use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering, Unobserved};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::message::Tile;
 
 use super::canvas::Origin;
 use super::describe::SceneFacts;
-use super::fitting::Fitting;
+use super::fitting::{Fitting, find};
 use super::hub::{Hub, Job, Settled};
 use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
@@ -23,11 +23,11 @@ use super::wish::Sketch;
 use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
 use crate::notices::{self, Uses};
-use crate::render::files::denoised_by;
+use crate::picture_files::denoised_by;
 
 /// Renders the pictures that pages request, until the view is over.
-pub(super) struct Painter<'a> {
-    hub: &'a Hub,
+pub(super) struct Painter {
+    hub: Arc<Hub>,
     /// Options with which the scene was read.
     options: SceneOptions,
     /// Memory of the largest card, bytes.
@@ -45,13 +45,14 @@ pub(super) struct Painter<'a> {
     assigned: Option<Vec<String>>,
 }
 
-impl<'a> Painter<'a> {
+impl Painter {
     /// Creates the painter of a scene, to which no assignments are applied yet.
     pub(super) fn new(
-        hub: &'a Hub,
+        hub: Arc<Hub>,
         (scene, dram_bytes): (Scene, u64),
-        options: &'a ViewOptions,
+        options: &ViewOptions,
         denoiser: Option<&'static Denoiser>,
+        renderer: Renderer,
     ) -> Self {
         let ViewOptions { scene: scene_options, quality, threads, .. } = options;
         Self {
@@ -62,7 +63,7 @@ impl<'a> Painter<'a> {
             finish: options.finish(),
             denoiser,
             threads: *threads,
-            renderer: Renderer::default(),
+            renderer,
             scene: Arc::new(scene),
             fitting: None,
             assigned: None,
@@ -70,9 +71,9 @@ impl<'a> Painter<'a> {
     }
 
     /// Renders until the view is over. A panic also ends the view.
-    pub(super) fn run(mut self) {
-        let _end = EndOnDrop(self.hub);
-        while let Some(job) = self.hub.next_job() {
+    pub(super) async fn run(mut self) {
+        let _end = EndOnDrop(self.hub.clone());
+        while let Some(job) = self.hub.next_job().await {
             if self.hub.take_card_back() {
                 self.renderer.close_cards();
             }
@@ -83,10 +84,11 @@ impl<'a> Painter<'a> {
                     continue;
                 }
             };
-            let done = self.assign(&task).and_then(|()| match task.work.pass {
-                Pass::Fit => self.fit(&task),
-                Pass::Coarse(_) | Pass::Full => self.render(&task),
-            });
+            let done = match (self.assign(&task), task.work.pass) {
+                (Ok(()), Pass::Fit) => self.fit(&task),
+                (Ok(()), Pass::Coarse(_) | Pass::Full) => self.render(&task).await,
+                (error, _) => error,
+            };
             if let Err(error) = done {
                 self.fail(&task, &error);
             }
@@ -141,6 +143,11 @@ impl<'a> Painter<'a> {
     /// interrupts the wait; the pilot renders continue for the camera with which they were started.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let by = (self.quality, self.finish);
+        if !self.hub.may_wait() {
+            let found = find(&self.scene, by, &task.settings, &Unobserved)?;
+            self.hub.change(|view, now| view.fit(task, found.as_ref(), now));
+            return Ok(());
+        }
         let begin = || Fitting::start(self.scene.clone(), by, task.settings.clone(), self.threads);
         let fitting = match self.fitting.take() {
             Some(fitting) => fitting,
@@ -162,8 +169,8 @@ impl<'a> Painter<'a> {
         }
     }
 
-    fn render(&mut self, task: &Task) -> Result<(), RenderError> {
-        let rendering = self.render_by_passes(task)?;
+    async fn render(&mut self, task: &Task) -> Result<(), RenderError> {
+        let rendering = self.render_by_passes(task).await?;
         let statistics = rendering.statistics.clone();
         if task.work.pass == Pass::Full {
             let denoised = self.denoise(task, &rendering.film)?;
@@ -181,7 +188,8 @@ impl<'a> Painter<'a> {
     /// Denoises the final picture of a request, if the view denoises. Pages are sent the result or the error.
     fn denoise(&self, task: &Task, film: &Film) -> Result<Option<Vec<[f32; 3]>>, RenderError> {
         let Some(denoiser) = self.denoiser else { return Ok(None) };
-        let denoised = denoiser.radiance(film, self.threads, &|| self.hub.must_stop());
+        let hub = &self.hub;
+        let denoised = denoiser.radiance(film, self.threads, &|| hub.must_stop());
         if let Err(DenoiseError::Stopped) = denoised {
             return Err(RenderError::Stopped);
         }
@@ -197,7 +205,7 @@ impl<'a> Painter<'a> {
 
     /// Renders a picture in passes, each with twice the samples of the pass before, up to the requested
     /// number.
-    fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
+    async fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
             task.settings.clone().with(|settings| {
@@ -207,15 +215,15 @@ impl<'a> Painter<'a> {
             })
         };
         let mut samples = 1;
-        let easel = Easel::new(self.hub, task, samples);
-        let mut rendering = self.renderer.render(&self.scene, &with(samples), &easel)?;
+        let easel = Easel::new(&self.hub, task, samples);
+        let mut rendering = self.renderer.picture(&self.scene, &with(samples), None, &easel).await?;
         while samples < asked.samples {
             let origin = Origin { samples, ..task.origin };
             self.hub.change(|view, _| view.refine(origin, &rendering.statistics));
             samples = asked.samples.min(2 * samples);
-            let easel = Easel::new(self.hub, task, samples);
-            rendering =
-                self.renderer.refine(&self.scene, &with(samples), Arc::new(rendering.film), &easel)?;
+            let easel = Easel::new(&self.hub, task, samples);
+            let base = Some(Arc::new(rendering.film));
+            rendering = self.renderer.picture(&self.scene, &with(samples), base, &easel).await?;
         }
         Ok(rendering)
     }
@@ -241,9 +249,9 @@ impl<'a> Painter<'a> {
 }
 
 /// Guard that ends the view when its painter ends.
-struct EndOnDrop<'a>(&'a Hub);
+struct EndOnDrop(Arc<Hub>);
 
-impl Drop for EndOnDrop<'_> {
+impl Drop for EndOnDrop {
     fn drop(&mut self) {
         self.0.end();
     }

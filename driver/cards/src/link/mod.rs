@@ -8,13 +8,13 @@
 
 mod fault_injector;
 mod loopback;
-#[cfg(not(target_family = "wasm"))]
 mod system;
 
 pub use fault_injector::{FaultInjector, LineFaults};
 pub use loopback::{LoopbackPort, loopback};
 #[cfg(not(target_family = "wasm"))]
 pub use system::{
-    HostPort, LinkError, ListedPort, ListenAddress, Listener, RemoteAddress, SerialLink, SerialOptions,
-    StreamPort, connect_tcp, connect_unix, host_name, list_serial_ports, open_serial,
+    HostPort, ListedPort, Listener, SerialLink, StreamPort, connect_tcp, connect_unix, list_serial_ports,
+    open_serial,
 };
+pub use system::{LinkError, ListenAddress, RemoteAddress, SerialOptions, host_name, reach};

@@ -10,7 +10,6 @@ use photoncard_map::pack::CardImage;
 use photoncard_picture::sums::{FilmPixel, SumFormat};
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::dram::EmulatedDram;
@@ -104,14 +103,13 @@ impl From<Fault> for DirectError {
     }
 }
 
-/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `model`, the
+/// Renders tiles on chips of a kind, one chip per thread of the current pool and one tile at a time. With `model`, the
 /// memory is modelled, and caches are empty at the beginning of each tile. `is_stopped` is polled before each
 /// tile.
 ///
 /// # Errors
 /// If the card image is malformed, a chip has no room for a tile, or the work is stopped.
 pub fn render_tiles_apart(
-    pool: &ThreadPool,
     kind: EmulatedKind,
     image: &CardImage,
     frame: &FrameParameters,
@@ -126,7 +124,7 @@ pub fn render_tiles_apart(
         Ok(render_tile_of(chip, image, model, frame, tile, None)?)
     };
     let new_chip = || kind.emulated().chip();
-    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+    tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect()
 }
 
 /// Renders tiles on one chip of a kind with modelled memory, as many at a time as the frame and the chip

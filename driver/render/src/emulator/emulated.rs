@@ -8,9 +8,10 @@ use photoncard_firmware::chip::Chip;
 use photoncard_firmware::kind::{Array, Buffer, Capacity, ChipKind, FixedCapacity, FixedKind, Map, Vacant};
 use photoncard_firmware::photon::{CandidateStorage, Candidates};
 use photoncard_shared::budget::Budget;
+use serde::{Deserialize, Serialize};
 
 /// Kind of chip whose buffers are on the heap. The fields state their sizes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Emulated {
     pub(super) budget: Budget,
     /// Number of gather points whose rays are cast together.

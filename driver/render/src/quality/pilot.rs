@@ -11,7 +11,6 @@ use photoncard_picture::film::Window;
 use photoncard_picture::sums::SumFormat;
 use photoncard_scene::Scene;
 use photoncard_shared::message::{CausticGather, FrameParameters, PixelLayers, Tile};
-use rayon::ThreadPool;
 
 use super::paths::Deviations;
 use super::spread::Levels;
@@ -156,8 +155,6 @@ pub(super) fn measure(
     let effort = effort.by(paths_of_photon);
     let Effort { few_photons, gather_rays: numbers_of_gather_rays, measures_guided } = effort;
     let more_photons = MORE * few_photons;
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
-    let pool = threads.build().map_err(RenderError::Chips)?;
     let settings = &enlarged(settings);
     // Tiles are spread over the whole picture, so that a crop has the same settings and pixels.
     let window = Window::full(settings.picture.width, settings.picture.height);
@@ -172,7 +169,7 @@ pub(super) fn measure(
         settings.integrator.seed = SEEDS[0];
     });
     let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
-    let pilot = |settings, photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
+    let pilot = |settings, photons| Pilot::new(scene, packed, settings, photons, observer);
     // Each pilot has its own card image, so only one pilot exists at a time.
     let few = pilot(settings, few_photons)?;
     let by_few_photons = render_map(&few)?;
@@ -320,11 +317,10 @@ fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     levels.mean_square(first, second)
 }
 
-/// Photon map of a pilot with its scene, and the threads of its chips.
+/// Photon map of a pilot with its scene.
 struct Pilot<'a> {
     scene: &'a Scene,
     mapped: MappedImage,
-    pool: &'a ThreadPool,
     observer: &'a dyn Observer,
     /// True if the picture has a caustic map, which replaces the caustics of gather rays.
     has_caustics: bool,
@@ -339,7 +335,6 @@ impl<'a> Pilot<'a> {
         packed: &PackedScene,
         settings: &RenderSettings,
         photons: usize,
-        pool: &'a ThreadPool,
         observer: &'a dyn Observer,
     ) -> Result<Self, RenderError> {
         observer.progress(Phase::Pilot, 0, 1);
@@ -353,7 +348,7 @@ impl<'a> Pilot<'a> {
         let used_share = is_open.then(|| traced.used_share(packed, &camera)).transpose()?;
         let mapped = map_traced(packed.clone(), traced, &photons, &go_on)?;
         let has_caustics = of_picture.caustic_photons > 0;
-        Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
+        Ok(Self { scene, mapped, observer, has_caustics, used_share })
     }
 
     /// Number of gather rays cast per pixel of `tiles`, with one sample per pixel and the setting
@@ -390,7 +385,7 @@ impl<'a> Pilot<'a> {
         let is_stopped = || self.observer.is_stopped();
         let image = &self.mapped.image;
         let chip = EmulatedKind::Reference;
-        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, None, &is_stopped)?)
+        Ok(render_tiles_apart(chip, image, frame, tiles, None, &is_stopped)?)
     }
 }
 

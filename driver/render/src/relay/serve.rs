@@ -8,9 +8,9 @@ use photoncard_shared::budget::Budget;
 use super::link::{CardPort, HostLink};
 use super::state::Relay;
 use crate::address::check_chips;
-use crate::cards::on_threads;
 use crate::emulator::SharedImage;
 use crate::greeting::{GreetedCard, GreetingError, greet, session_number};
+use crate::hands::{Hands, completed, on_threads};
 use crate::open_card::OpenCard;
 use crate::{CardAddress, RenderError, Unobserved};
 
@@ -31,9 +31,10 @@ impl RelayCards {
             .enumerate();
         let greetings = each.map(|(index, address)| {
             move || {
-                let card = OpenCard::open(index, address, None, &SharedImage::default(), None);
-                let greeted =
-                    card.map_err(GreetingError::from).and_then(|card| greet(card, start, &Unobserved));
+                let hands = &Hands::Threads;
+                let card = OpenCard::open(index, address, hands, None, &SharedImage::default(), None);
+                let greeted = card.map_err(GreetingError::from);
+                let greeted = greeted.and_then(|card| completed(greet(card, hands, start, &Unobserved)));
                 let name = address.name_of(index);
                 match greeted {
                     Ok(GreetedCard { card, budget, .. }) => Ok((name, CardPort::new(card), budget)),

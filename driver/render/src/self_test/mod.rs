@@ -14,6 +14,7 @@ pub use self::arithmetic::{ArithmeticTest, WrongResult, WrongResults};
 use self::bench::Bench;
 pub use self::memory::PatternTest;
 use super::greeting::{GreetingError, greet_port, open};
+use super::hands::{Hands, completed};
 use super::{CardAddress, Observer, RenderError};
 
 /// Result of a card's self-test.
@@ -73,7 +74,7 @@ pub fn self_test_on(
 
 fn test(port: &mut impl Port, observer: &dyn Observer) -> Result<SelfTest, GreetingError> {
     let start = Instant::now();
-    let (session, budget) = greet_port(port, start, observer)?;
+    let (session, budget) = completed(greet_port(port, &Hands::Threads, start, observer))?;
     let mut bench = Bench::new(session, port, start, observer);
     let arithmetic = arithmetic::test(&mut bench)?;
     let (lines, patterns) = memory::test(&mut bench)?;

@@ -23,6 +23,16 @@ class Place(NamedTuple):
     groups: tuple[bpy.types.Node, ...]
 
 
+Path = tuple[str, ...]
+"""An input in any copy of a tree: names of the group nodes and of the node, and the socket's identifier."""
+
+
+def path_of(place: Place) -> Path:
+    """The path of an input."""
+    socket = place.socket
+    return (*(group.name for group in place.groups), socket.node.name, socket.identifier)
+
+
 def has_nodes(owner: bpy.types.Material | bpy.types.World) -> bool:
     """True if nodes state a material or a world. Since Blender 5.0 they always do."""
     return owner.node_tree is not None and (bpy.app.version >= (5, 0, 0) or owner.use_nodes)

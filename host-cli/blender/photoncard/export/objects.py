@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +12,12 @@ import bpy
 from ..glb import Glb
 from ..notices import Notices
 from .axes import node_matrix
+from .bakes import BakeMaterials, MaterialBakes
 from .camera import CameraError, Frame, add_camera
 from .clipping import Clipping
 from .lights import add_light
 from .materials import MaterialExporter
-from .meshes import MeshExporter
+from .meshes import MeshExporter, materials_of
 from .world import Bake, World, world_of
 
 _RAYS = ("diffuse", "glossy", "transmission", "shadow")
@@ -54,17 +56,22 @@ def export(
     camera: bpy.types.Object | None,
     frame: Frame,
     bake: Bake | None = None,
+    bake_materials: BakeMaterials | None = None,
     is_view: bool = False,
 ) -> Exported:
-    """Exports an evaluated scene as its view layer shows it to a camera. `bake` renders nodes of the world.
-    A viewport (`is_view`) has a camera of its own, and needs none of the scene.
+    """Exports an evaluated scene as its view layer shows it to a camera. `bake` renders nodes of the world,
+    `bake_materials` those of materials. A viewport (`is_view`) has a camera of its own, and needs none of the
+    scene.
 
     Raises `CameraError`.
     """
     exporter = _Exporter(depsgraph)
-    for instance in depsgraph.object_instances:
-        if instance.show_self:
-            exporter.add(instance)
+    with tempfile.TemporaryDirectory(prefix="photoncard-bake-", dir=bpy.app.tempdir) as folder:
+        if bake_materials is not None:
+            exporter.bake(bake_materials, folder)
+        for instance in depsgraph.object_instances:
+            if instance.show_self:
+                exporter.add(instance)
     scene = depsgraph.scene
     evaluated = camera.evaluated_get(depsgraph) if camera else None
     exporter.clipping.notice(evaluated, exporter.notices)
@@ -92,9 +99,18 @@ class _Exporter:
         self.notices = Notices()
         self.materials = MaterialExporter(self.glb, self.notices, layer.material_override)
         self.light_groups = {group.name for group in layer.lightgroups}
+        self._depsgraph = depsgraph
         self._layer = layer
         self.clipping = Clipping()
         self._meshes = MeshExporter(self.glb, self.materials, self.notices)
+        self._bakes = MaterialBakes(self.materials, self.notices)
+
+    def bake(self, run: BakeMaterials, folder: str) -> None:
+        """Has materials baked, with images in a folder, before instances are added."""
+        for instance in self._depsgraph.object_instances:
+            if instance.show_self:
+                self._bakes.add(instance)
+        self._bakes.bake(run, folder)
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         ob = instance.object
@@ -106,7 +122,8 @@ class _Exporter:
             self._note_rays(ob)
             add_light(self.glb, ob, instance.matrix_world, extras, is_seen, self.notices)
             return
-        mesh = self._meshes.mesh_of(ob, real)
+        materials = materials_of(ob, real) if ob.type == "MESH" else []
+        mesh = self._meshes.mesh_of(ob, materials, self._bakes.of(ob, materials, instance.matrix_world))
         if mesh is None:
             return
         self._note_rays(ob)

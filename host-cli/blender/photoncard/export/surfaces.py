@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 
 import bpy
@@ -10,7 +10,7 @@ import numpy as np
 
 from ..notices import Notices
 from .images import Unreadable
-from .nodes import Place, Unsupported, active_output, input_of, is_linked, resolve
+from .nodes import Path, Place, Unsupported, active_output, input_of, is_linked, path_of, resolve
 from .value import Value, combine, constant
 from .values import constant_of, value_of
 
@@ -56,15 +56,26 @@ class Surface:
         )
 
 
+_REMEDY = "Bake Procedural Materials in the render settings keeps it"
+
 _EMPTY = Surface(alpha=constant(0.0))
 
 
 class SurfaceReader:
-    """Reads the surface of one material, and notices what it leaves out."""
+    """Reads the surface of one material, and notices what it leaves out.
 
-    def __init__(self, name: str, notices: Notices) -> None:
+    `baked` has values of inputs that stand for those of their nodes.
+    """
+
+    def __init__(self, name: str, notices: Notices, baked: Mapping[Path, Value] | None = None) -> None:
+        self.varying: set[Path] = set()
+        """Inputs that are not the same everywhere, but for normals."""
+        self.unsaid: set[Path] = set()
+        """Inputs whose nodes glTF has no counterpart of, but for normals."""
+        self.unsaid_normals: set[Path] = set()
         self._name = name
         self._notices = notices
+        self._baked = baked or {}
 
     def read(self, tree: bpy.types.NodeTree) -> Surface:
         """The surface that a material's nodes state."""
@@ -90,15 +101,38 @@ class SurfaceReader:
             return Surface(base=constant((0.8, 0.8, 0.8)))
         return read(self, end)
 
+    def _value_of(self, place: Place) -> Value:
+        """Value of an input. Raises `Unsupported` or `Unreadable`."""
+        path = path_of(place)
+        if path in self._baked:
+            return self._baked[path]
+        try:
+            value = value_of(place)
+        except Unsupported:
+            self.unsaid.add(path)
+            raise
+        if not value.is_constant:
+            self.varying.add(path)
+        return value
+
     def _value(self, end: Place, name: str) -> Value:
         """Value of an input; what it has unlinked, and a notice, if its nodes cannot be said."""
         place = input_of(end, name)
         try:
-            return value_of(place)
+            return self._value_of(place)
         except (Unsupported, Unreadable) as reason:
-            self._note(f"{name} takes its unlinked value ({reason}); bake it to an image texture to keep it")
+            self._note(f"{name} takes its unlinked value ({reason}); {_REMEDY}")
             value = place.socket.default_value
             return constant(value if isinstance(value, (int, float)) else tuple(value))
+
+    def _combine(self, node: bpy.types.Node, function: Callable[..., np.ndarray], *values: Value) -> Value:
+        """The value of a function of several values: of their means if they have no common mapping."""
+        try:
+            return combine(node, function, *values)
+        except Unsupported as reason:
+            self.unsaid |= self.varying
+            self._note(f"textures are rendered as their means ({reason}); {_REMEDY}")
+            return combine(node, function, *(constant(value.colour) for value in values))
 
     def _constant(self, end: Place, name: str) -> float:
         value = self._value(end, name)
@@ -118,7 +152,7 @@ class SurfaceReader:
         level, tint = self._value(end, "Specular IOR Level"), self._value(end, "Specular Tint")
         node = end.socket.node
         emission = (
-            combine(
+            self._combine(
                 node,
                 lambda a, b: a * b,
                 self._value(end, "Emission Color"),
@@ -137,11 +171,11 @@ class SurfaceReader:
             metallic=self._value(end, "Metallic"),
             roughness=self._value(end, "Roughness"),
             ior=max(self._constant(end, "IOR"), 1.0),
-            specular=combine(node, lambda a, b: 2 * a * b, level, tint),
+            specular=self._combine(node, lambda a, b: 2 * a * b, level, tint),
             transmission=self._value(end, "Transmission Weight"),
             coat=coat,
             coat_roughness=self._value(end, "Coat Roughness"),
-            sheen=combine(
+            sheen=self._combine(
                 node, lambda a, b: a * b, self._value(end, "Sheen Weight"), self._value(end, "Sheen Tint")
             ),
             sheen_roughness=self._constant(end, "Sheen Roughness"),
@@ -157,6 +191,9 @@ class SurfaceReader:
         return is_linked(strength) or strength.socket.default_value != 0
 
     def _normal(self, place: Place) -> NormalMap | None:
+        path = path_of(place)
+        if path in self._baked:
+            return NormalMap(self._baked[path], 1.0)
         end = resolve(place)
         if not end.socket.is_output:
             return None
@@ -171,9 +208,9 @@ class SurfaceReader:
                 value = replace(value, mapping=replace(value.mapping, uv_map=node.uv_map))
             return NormalMap(value, constant_of(input_of(end, "Strength"))[0])
         except (Unsupported, Unreadable) as reason:
-            self._note(
-                f"normals are those of the mesh ({reason}); bake them to an image texture to keep them"
-            )
+            if isinstance(reason, Unsupported):
+                self.unsaid_normals.add(path)
+            self._note(f"normals are those of the mesh ({reason}); {_REMEDY}")
             return None
 
     def _diffuse(self, end: Place) -> Surface:
@@ -232,13 +269,13 @@ class SurfaceReader:
 
     def _emission(self, end: Place) -> Surface:
         colour, strength = self._value(end, "Color"), self._value(end, "Strength")
-        return Surface(emission=combine(end.socket.node, lambda a, b: a * b, colour, strength))
+        return Surface(emission=self._combine(end.socket.node, lambda a, b: a * b, colour, strength))
 
     def _add(self, end: Place) -> Surface:
         first, second = (self._shader(Place(socket, end.groups)) for socket in end.socket.node.inputs)
         for one, other in ((first, second), (second, first)):
             if _only_emits(one):
-                emission = combine(end.socket.node, lambda a, b: a + b, one.emission, other.emission)
+                emission = self._combine(end.socket.node, lambda a, b: a + b, one.emission, other.emission)
                 return replace(other, emission=emission)
             if _is_empty(one):
                 return replace(other, alpha=constant(1.0))
@@ -254,9 +291,9 @@ class SurfaceReader:
         if kind in {"ShaderNodeFresnel", "ShaderNodeLayerWeight"}:
             return self._coated(factor_end, first, second)
         try:
-            factor = value_of(factor_place)
+            factor = self._value_of(factor_place)
         except (Unsupported, Unreadable) as reason:
-            self._note(f"a Mix Shader takes half of each ({reason})")
+            self._note(f"a Mix Shader takes half of each ({reason}); {_REMEDY}")
             factor = constant(0.5)
         return self._mixed(node, factor, first, second)
 
@@ -284,28 +321,41 @@ class SurfaceReader:
         rest = factor.map(lambda texels: 1 - texels)
         for shown, part, other in ((second, share, first), (first, rest, second)):
             if _is_empty(other):
-                return replace(shown, alpha=_product(node, shown.alpha, part))
+                return replace(shown, alpha=self._product(node, shown.alpha, part))
         for shown, part, other, others in ((second, share, first, rest), (first, rest, second, share)):
             if _only_emits(other):
                 return replace(
                     shown,
-                    base=_product(node, shown.base, part),
-                    specular=_product(node, shown.specular, part),
-                    emission=_sum(
-                        node, _product(node, shown.emission, part), _product(node, other.emission, others)
+                    base=self._product(node, shown.base, part),
+                    specular=self._product(node, shown.specular, part),
+                    emission=self._sum(
+                        node,
+                        self._product(node, shown.emission, part),
+                        self._product(node, other.emission, others),
                     ),
                 )
         if _kind(first) != _kind(second):
             self._note("a Mix Shader of unlike shaders is rendered with the mean of their parameters")
-        return _interpolated(node, factor, first, second)
+        return self._interpolated(node, factor, first, second)
 
+    def _product(self, node: bpy.types.Node, first: Value, second: Value) -> Value:
+        return self._combine(node, lambda a, b: a * b, first, second)
 
-def _product(node: bpy.types.Node, first: Value, second: Value) -> Value:
-    return combine(node, lambda a, b: a * b, first, second)
+    def _sum(self, node: bpy.types.Node, first: Value, second: Value) -> Value:
+        return self._combine(node, lambda a, b: a + b, first, second)
 
+    def _interpolated(self, node: bpy.types.Node, factor: Value, first: Surface, second: Surface) -> Surface:
+        def mixed(a: object, b: object) -> object:
+            if isinstance(a, Value) and isinstance(b, Value):
+                if a.is_constant and b.is_constant and np.array_equal(a.texels, b.texels):
+                    return a
+                return self._combine(node, lambda t, x, y: x + t * (y - x), factor, a, b)
+            if isinstance(a, bool) or not isinstance(a, float):
+                return a or b
+            return a + factor.number * (b - a)
 
-def _sum(node: bpy.types.Node, first: Value, second: Value) -> Value:
-    return combine(node, lambda a, b: a + b, first, second)
+        names = [item.name for item in fields(Surface)]
+        return Surface(**{name: mixed(getattr(first, name), getattr(second, name)) for name in names})
 
 
 def _is_empty(surface: Surface) -> bool:
@@ -320,20 +370,6 @@ def _only_emits(surface: Surface) -> bool:
 
 def _kind(surface: Surface) -> tuple[bool, bool]:
     return bool(surface.metallic.texels.any()), bool(surface.transmission.texels.any())
-
-
-def _interpolated(node: bpy.types.Node, factor: Value, first: Surface, second: Surface) -> Surface:
-    def mixed(a: object, b: object) -> object:
-        if isinstance(a, Value) and isinstance(b, Value):
-            if a.is_constant and b.is_constant and np.array_equal(a.texels, b.texels):
-                return a
-            return combine(node, lambda t, x, y: x + t * (y - x), factor, a, b)
-        if isinstance(a, bool) or not isinstance(a, float):
-            return a or b
-        return a + factor.number * (b - a)
-
-    names = [item.name for item in fields(Surface)]
-    return Surface(**{name: mixed(getattr(first, name), getattr(second, name)) for name in names})
 
 
 _LOST = (

@@ -9,7 +9,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from .images import linear_pixels
+from .images import linear_pixels, resized
 from .nodes import Unsupported
 
 
@@ -112,9 +112,7 @@ def of_one_size(*values: Value) -> list[np.ndarray]:
 def _resized(texels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     if texels.ndim == 1 or texels.shape[:2] == size:
         return texels
-    rows = np.arange(size[0]) * texels.shape[0] // size[0]
-    columns = np.arange(size[1]) * texels.shape[1] // size[1]
-    return texels[rows[:, None], columns]
+    return resized(texels, size)
 
 
 def grey(values: np.ndarray) -> np.ndarray:

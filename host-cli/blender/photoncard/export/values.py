@@ -9,7 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from .images import check_readable
+from .images import check_readable, tiled_pixels
 from .nodes import Place, Unsupported, input_of, resolve
 from .value import Mapping, Value, combine, constant, grey, with_alpha
 
@@ -59,8 +59,6 @@ def _image(end: Place) -> Value:
     if node.image is None:
         # Cycles shows a missing image in pink; an empty node is black.
         return constant((0.0, 0.0, 0.0, 0.0)) if end.socket.name == "Color" else constant(0.0)
-    if node.image.source == "TILED":
-        raise Unsupported(node, "its image is tiled (UDIM)")
     if node.projection != "FLAT":
         raise Unsupported(node, f"its projection is {node.projection.title()}")
     mapping = replace(
@@ -68,9 +66,24 @@ def _image(end: Place) -> Value:
         wrap=node.extension,
         is_nearest=node.interpolation == "Closest",
     )
-    check_readable(node.image)
-    colour = Value(None, mapping, node.image)
+    if node.image.source == "TILED":
+        colour = _tiles(node, mapping)
+    else:
+        check_readable(node.image)
+        colour = Value(None, mapping, node.image)
     return colour.map(lambda texels: grey(texels[..., 3])) if end.socket.name == "Alpha" else colour
+
+
+def _tiles(node: bpy.types.Node, mapping: Mapping) -> Value:
+    """All tiles (UDIM) in one image, on which a transform brings the UV map."""
+    if replace(mapping, uv_map="", wrap="", is_nearest=False) != Mapping(wrap=""):
+        raise Unsupported(node, "its image is tiled (UDIM), and follows a mapping")
+    tiles = tiled_pixels(node.image)
+    if tiles is None:
+        raise Unsupported(node, "the tiles of its image (UDIM) are too large together")
+    width, height = 1 / tiles.columns, 1 / tiles.rows
+    offset = (-tiles.column * width, 1 - (1 - tiles.row) * height)
+    return Value(tiles.pixels, replace(mapping, offset=offset, scale=(width, height), wrap="EXTEND"))
 
 
 def _mapping(vector: Place) -> Mapping:

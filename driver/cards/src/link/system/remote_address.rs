@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::serial_options::SerialOptions;
-use super::socket::{host_name, tcp_address};
 
 /// Address of a card that is not emulated in this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,4 +120,18 @@ fn tcp(text: &str) -> Result<RemoteAddress, String> {
     let (host, port) = text.rsplit_once(':').ok_or_else(usage)?;
     let port = port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?;
     Ok(RemoteAddress::Tcp { host: host_name(host)?, port })
+}
+
+/// Formats a TCP address as an argument of `--card`.
+pub(crate) fn tcp_address(host: &str, port: u16) -> String {
+    if host.contains(':') { format!("tcp:[{host}]:{port}") } else { format!("tcp:{host}:{port}") }
+}
+
+/// Parses a host name or address; the brackets of an IPv6 address are removed.
+pub fn host_name(text: &str) -> Result<String, String> {
+    match text.strip_prefix('[').and_then(|text| text.strip_suffix(']')) {
+        Some(address) if !address.is_empty() => Ok(address.into()),
+        None if !text.is_empty() && !text.contains([':', '[', ']']) => Ok(text.into()),
+        _ => Err(format!("{text:?} is no host; use a name, an IPv4 address or an IPv6 address in brackets")),
+    }
 }

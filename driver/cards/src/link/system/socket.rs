@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use rustix::net::sockopt;
 
+use super::remote_address::tcp_address;
 use super::{LinkError, StreamPort};
 
 /// Time limit of a connection attempt.
@@ -21,20 +22,6 @@ const CONNECT_WAIT: Duration = Duration::from_secs(5);
 /// If the host name has no address, or no address accepts the connection within 5 s.
 pub fn connect_tcp(host: &str, port: u16) -> Result<StreamPort<TcpStream>, LinkError> {
     connect(host, port).map_err(|error| LinkError::connect(tcp_address(host, port), &error))
-}
-
-/// Formats a TCP address as an argument of `--card`.
-pub(crate) fn tcp_address(host: &str, port: u16) -> String {
-    if host.contains(':') { format!("tcp:[{host}]:{port}") } else { format!("tcp:{host}:{port}") }
-}
-
-/// Parses a host name or address; the brackets of an IPv6 address are removed.
-pub fn host_name(text: &str) -> Result<String, String> {
-    match text.strip_prefix('[').and_then(|text| text.strip_suffix(']')) {
-        Some(address) if !address.is_empty() => Ok(address.into()),
-        None if !text.is_empty() && !text.contains([':', '[', ']']) => Ok(text.into()),
-        _ => Err(format!("{text:?} is no host; use a name, an IPv4 address or an IPv6 address in brackets")),
-    }
 }
 
 fn connect(host: &str, port: u16) -> io::Result<StreamPort<TcpStream>> {
