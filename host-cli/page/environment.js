@@ -17,8 +17,9 @@ export class Surroundings {
     #announced = 0;
     #map = null;
 
-    // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind; `told(text)` is shown.
-    // `takes(files)` tells whether files that are dropped are meant for the scene that is shown.
+    // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind;
+    // `told(text)` is shown. `takes(files)` tells whether files that are dropped are meant for the scene that
+    // is shown.
     constructor({ send, upload, isBusy, told, takes }) {
         Object.assign(this, { send, upload, isBusy, told, takes });
         const stage = byId("stage");
@@ -60,7 +61,8 @@ export class Surroundings {
         if (this.#announced > 0) this.#file = file;
     }
 
-    // Something was refused: perhaps the message of this number that has announced a file, or the file itself.
+    // Something was refused: perhaps the message of this number that has announced a file, or the file
+    // itself.
     refused(id) {
         if (id === this.#announced) this.#file = null;
         if (!this.#file) this.show(this.#map);
