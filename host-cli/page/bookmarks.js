@@ -46,7 +46,8 @@ export class Bookmarks {
 
     #show() {
         byId("bookmarks").replaceChildren(...this.#list.map(({ name, camera }, index) => {
-            const go = element("button", { type: "button", textContent: index < 9 ? `Go (${index + 1})` : "Go", ariaLabel: `Go to ${name}` });
+            const key = index < 9 ? ` (${index + 1})` : "";
+            const go = element("button", { type: "button", textContent: `Go${key}`, ariaLabel: `Go${key} to ${name}` });
             const label = element("input", { value: name, ariaLabel: "Name of the bookmark", spellcheck: false });
             const remove = element("button", { type: "button", textContent: "×", ariaLabel: `Remove ${name}` });
             go.addEventListener("click", () => this.go(camera));

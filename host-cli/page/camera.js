@@ -1,6 +1,7 @@
-// Cameras and their moves: pure functions. A camera is {position, look_at} in metres, and one of fov, the vertical degrees of a
-// perspective picture, height, the metres of an orthographic one, and angles, the degrees of a panorama. The top of its picture is
-// towards +y. It has the lens and the shift of the scene's camera `name`.
+// Cameras and their moves: pure functions. A camera is {position, look_at} in metres, and one of fov, the
+// vertical degrees of a perspective picture, height, the metres of an orthographic one, and angles, the
+// degrees of a panorama. The top of its picture is towards +y. It has the lens and the shift of the scene's
+// camera `name`.
 
 export const add = (a, b) => a.map((value, axis) => value + b[axis]);
 export const sub = (a, b) => a.map((value, axis) => value - b[axis]);
@@ -15,7 +16,8 @@ const clamped = (value, low, high) => Math.min(Math.max(value, low), high);
 const STEEPEST = 89.5 * Math.PI / 180;
 // Greatest coordinate of a camera, metres: a move beyond it is none.
 const FARTHEST = 1e9;
-// Shortest view from a camera to what it looks at, as a share of its greatest coordinate: single precision tells its direction.
+// Shortest view from a camera to what it looks at, as a share of its greatest coordinate: single precision
+// tells its direction.
 const SHORTEST = 1e-3;
 // Lowest orthographic picture, metres.
 const LOWEST = 1e-6;
@@ -45,8 +47,8 @@ function moved(camera, shift) {
     return greatest(there.position, there.look_at) <= FARTHEST ? there : camera;
 }
 
-// Turn about a point: `yaw` about the vertical, `pitch` about the picture's right, radians. About the camera's own position it
-// looks around; about another point, that point stays where it is in the picture.
+// Turn about a point: `yaw` about the vertical, `pitch` about the picture's right, radians. About the
+// camera's own position it looks around; about another point, that point stays where it is in the picture.
 export function turned(camera, centre, yaw, pitch) {
     const { right, forward } = axes(camera);
     const elevation = Math.asin(clamped(forward[1], -1, 1));
@@ -61,15 +63,16 @@ function shown({ fov, height, angles }, depth) {
     return angles ? radians(angles[1]) * depth : 2 * Math.tan(radians(fov) / 2) * depth;
 }
 
-// Shift by a drag of pixels, so that what is `depth` metres away follows the pointer. A panorama is shifted along the middle's axes.
+// Shift by a drag of pixels, so that what is `depth` metres away follows the pointer. A panorama is shifted
+// along the middle's axes.
 export function panned(camera, [dx, dy], height, depth) {
     const { right, up } = axes(camera);
     const metres = shown(camera, depth) / height;
     return moved(camera, add(scaled(right, -dx * metres), scaled(up, dy * metres)));
 }
 
-// Approach to a point: its distance is multiplied by `factor`, and it stays where it is in the picture. An orthographic picture
-// shows less instead.
+// Approach to a point: its distance is multiplied by `factor`, and it stays where it is in the picture. An
+// orthographic picture shows less instead.
 export function dollied(camera, centre, factor) {
     const way = scaled(sub(centre, camera.position), 1 - factor);
     if (camera.height === undefined) return moved(camera, way);
@@ -85,12 +88,12 @@ function shrunk({ low, high }, share) {
     return { low: low.map(value => value + margin), high: high.map(value => value - margin) };
 }
 
-// The space in which a camera stays that is within a room of these bounds; null for a camera outside. A camera at its border is inside,
-// however it was rounded.
+// The space in which a camera stays that is within a room of these bounds; null for a camera outside. A
+// camera at its border is inside, however it was rounded.
 export const roomOf = ({ position }, bounds) => isWithin(position, shrunk(bounds, 0.01)) ? shrunk(bounds, 0.02) : null;
 
-// The camera after a move, kept in a room. An orbit comes closer to its centre where a wall is in its way; other moves end at the wall, or
-// go along it.
+// The camera after a move, kept in a room. An orbit comes closer to its centre where a wall is in its way;
+// other moves end at the wall, or go along it.
 export function kept(camera, room, centre = null) {
     const { position, look_at } = camera;
     if (isWithin(position, room)) return camera;
@@ -149,7 +152,8 @@ export function extent({ fov, height, angles }, convert) {
     return angles ? { angles: angles.map(convert) } : { fov: convert(fov) };
 }
 
-// The camera in single precision, as the renderer has it. From far away it looks at a place farther along its view.
+// The camera in single precision, as the renderer has it. From far away it looks at a place farther along its
+// view.
 export function rounded(camera) {
     const { position, look_at } = camera;
     const least = SHORTEST * greatest(position);

@@ -12,7 +12,8 @@ export class Compare {
     #display = null;
     #place = [0, 0, 0, 0];
 
-    // `changed()` is called when the pictures must be shown otherwise, `go(camera)` moves to where one was kept.
+    // `changed()` is called when the pictures must be shown otherwise, `go(camera)` moves to where one was
+    // kept.
     constructor(changed, go) {
         this.changed = changed;
         byId("split").addEventListener("input", () => this.#cut());

@@ -24,9 +24,9 @@ export class Controls {
     // Where an orbit would be without walls, for as long as it lasts: it finds its distance again.
     #free = null;
 
-    // `view` has `camera`, `scene` (bounds), `size` (the picture's, pixels), `steers`, `staysInside` and `movesPicture`, and takes
-    // `move(camera, isMoving)`, `wall()`, `pick([x, y])`, `cursor([x, y] or null)`, `magnify(factor, [x, y] of the window)` and
-    // `slide([dx, dy])` of the picture on the stage.
+    // `view` has `camera`, `scene` (bounds), `size` (the picture's, pixels), `steers`, `staysInside` and
+    // `movesPicture`, and takes `move(camera, isMoving)`, `wall()`, `pick([x, y])`, `cursor([x, y] or null)`,
+    // `magnify(factor, [x, y] of the window)` and `slide([dx, dy])` of the picture on the stage.
     constructor(canvas, view) {
         Object.assign(this, { canvas, view });
         const listen = (target, type, act) => target.addEventListener(type, act.bind(this), { passive: false });

@@ -1,12 +1,14 @@
-// The picture on a canvas: by WebGL2, where exposure and curve cost nothing, or else by the processor on a 2D canvas.
+// The picture on a canvas: by WebGL2, where exposure and curve cost nothing, or else by the processor on a 2D
+// canvas.
 
 import { CURVES, SHADER, codes, marked } from "./tone.js";
 
 const CORNERS = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1); }`;
 
-// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, overlay, greatest, isPreview}. Of a preview the shader smooths the
-// squares, the processor does not. `restored()` is called when a lost context is there again.
+// A display has `draw(picture, tone)`; `tone` is {mode, scale, curve, overlay, greatest, isPreview}. Of a
+// preview the shader smooths the squares, the processor does not. `restored()` is called when a lost context
+// is there again.
 export function displayOn(canvas, restored) {
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
     const gl = canvas.getContext("webgl2", options);

@@ -2,6 +2,9 @@
 
 import { setText } from "./status.js";
 
+// Whether a file is an environment map, by its name.
+export const isMap = ({ name }) => /\.(hdr|exr)$/i.test(name);
+
 const byId = id => document.getElementById(id);
 // Bytes of a message; the command takes up to 64 KiB.
 const SHARE = 32768;
@@ -14,9 +17,11 @@ export class Surroundings {
     #announced = 0;
     #map = null;
 
-    // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind; `told(text)` is shown.
-    constructor({ send, upload, isBusy, told }) {
-        Object.assign(this, { send, upload, isBusy, told });
+    // `send(message)` and `upload(bytes)` go to the command, `isBusy()` tells whether it lags behind;
+    // `told(text)` is shown. `takes(files)` tells whether files that are dropped are meant for the scene that
+    // is shown.
+    constructor({ send, upload, isBusy, told, takes }) {
+        Object.assign(this, { send, upload, isBusy, told, takes });
         const stage = byId("stage");
         const turn = byId("rotation");
         turn.addEventListener("input", () => setText("degrees", `${turn.value}°`));
@@ -25,14 +30,16 @@ export class Surroundings {
             this.#take(target.files);
             target.value = "";
         });
-        stage.addEventListener("dragover", event => {
+        // Beside the picture too: the browser would leave the page for a file that is dropped there.
+        addEventListener("dragover", event => {
             event.preventDefault();
             stage.classList.add("target");
         });
-        for (const type of ["dragleave", "drop"]) stage.addEventListener(type, () => stage.classList.remove("target"));
-        stage.addEventListener("drop", event => {
+        for (const type of ["dragleave", "drop"]) addEventListener(type, () => stage.classList.remove("target"));
+        addEventListener("drop", event => {
             event.preventDefault();
-            this.#take(event.dataTransfer.files);
+            const files = [...event.dataTransfer.files];
+            if (this.takes(files) && !byId("map").closest("[inert]")) this.#take(files);
         });
     }
 
@@ -47,14 +54,15 @@ export class Surroundings {
     }
 
     #take(files) {
-        const file = [...files ?? []].find(({ name }) => /\.(hdr|exr)$/i.test(name));
+        const file = [...files ?? []].find(isMap);
         if (!file) return this.told("An environment map is a file .hdr or .exr.");
         if (this.#file) return this.told("Another map is still on its way.");
         this.#announced = this.send({ type: "drop", name: file.name, bytes: file.size });
         if (this.#announced > 0) this.#file = file;
     }
 
-    // Something was refused: perhaps the message of this number that has announced a file, or the file itself.
+    // Something was refused: perhaps the message of this number that has announced a file, or the file
+    // itself.
     refused(id) {
         if (id === this.#announced) this.#file = null;
         if (!this.#file) this.show(this.#map);

@@ -33,7 +33,8 @@ export class Exposure {
         }
     }
 
-    // Keeps an automatic exposure as it is: with a measured one, a light that is changed would look as before.
+    // Keeps an automatic exposure as it is: with a measured one, a light that is changed would look as
+    // before.
     hold() {
         const { automatic } = this.#inputs;
         if (!automatic.checked) return;
@@ -64,7 +65,8 @@ export class Exposure {
         this.#measuredAt = -Infinity;
     }
 
-    // Mapping of a layer to the screen. A settled picture is measured as `photoncard tonemap` does it, others in passing.
+    // Mapping of a layer to the screen. A settled picture is measured as `photoncard tonemap` does it, others
+    // in passing.
     of(layer, picture, isSettled) {
         const { exposure, automatic, stops, curve } = this.#inputs;
         const mode = modeOf(layer);

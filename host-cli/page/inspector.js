@@ -1,10 +1,12 @@
-// Values of a pixel, and how bright the picture is: a histogram in stops about middle grey, and what is clipped.
+// Values of a pixel, and how bright the picture is: a histogram in stops about middle grey, and what is
+// clipped.
 
 import { setText } from "./status.js";
 import { MODES, codes, luminance } from "./tone.js";
 
 const byId = id => document.getElementById(id);
-// Stops that the histogram shows, bars in it, pixels that are looked at, and milliseconds between two of them.
+// Stops that the histogram shows, bars in it, pixels that are looked at, and milliseconds between two of
+// them.
 const [LOW, HIGH] = [-10, 6];
 const BARS = 64;
 const PIXELS = 40000;

@@ -6,7 +6,7 @@ import { Compare } from "./compare.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { displayOn } from "./display.js";
-import { Surroundings } from "./environment.js";
+import { Surroundings, isMap } from "./environment.js";
 import { Exposure } from "./exposure.js";
 import { element } from "./fields.js";
 import { History } from "./history.js";
@@ -26,6 +26,9 @@ import { Turntable } from "./turntable.js";
 import { Zoom, putAt } from "./zoom.js";
 
 const byId = id => document.getElementById(id);
+
+// What the page that steers may use alone.
+const STEERED = "#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset, #denoise, #rotation, #map, #turntable";
 
 // Cards of a page that has its own host: each is a worker with a card memory of its own.
 const MAX_CARDS = 16;
@@ -47,8 +50,14 @@ const inspector = new Inspector();
 // State of the command as last received, and the requests of this page.
 let scene = null, state = null, isOpen = false, steers = false;
 let camera = null, isCameraOwn = false, toSend = null;
-const asked = { layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined, edits: new Map(), mixes: new Map(),
-    saveId: 0, changed: 0, refused: 0, tone: null };
+const asked = {
+    layer: "radiance", side: "512", size: null, started: null, camera: "", cameraId: 0, cursor: undefined,
+    edits: new Map(), mixes: new Map(), saveId: 0,
+    // Numbers of the last message that has made a picture, and of that one when something was refused.
+    changed: 0, refused: 0,
+};
+// Tone of the picture as it was drawn last.
+let drawn = null;
 // Pixel under the pointer; null for none.
 let pointed = null;
 
@@ -132,13 +141,19 @@ const controls = new Controls(canvas, view);
 const visit = place => place && view.steers && view.move(place, false);
 const bookmarks = new Bookmarks(() => camera, visit);
 const compare = new Compare(() => drawing.soon(), visit);
-const turntable = new Turntable(yaw => view.steers && controls.orbit(yaw, 0), () => { press("turntable", false); controls.rest(); },
+const turntable = new Turntable(
+    yaw => view.steers && controls.orbit(yaw, 0),
+    () => {
+        press("turntable", false);
+        controls.rest();
+    },
     () => Number(byId("period").value));
 const surroundings = new Surroundings({
     send: message => send("environment", message),
     upload: bytes => connection.upload(bytes),
     isBusy: () => connection.isBusy,
     told: tell,
+    takes: files => !start || byId("start").hidden && files.every(isMap),
 });
 const start = hasHost ? new Start(open) : null;
 const saving = new Saving(fields => asked.saveId = send("", { type: "save", ...fields, ...exposure.asked }));
@@ -204,9 +219,7 @@ function setSteers(value) {
     steers = value;
     asked.size = null;
     byId("spectator").hidden = steers;
-    for (const field of document.querySelectorAll("#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset, #denoise, #rotation, #map, #turntable")) {
-        field.inert = !steers;
-    }
+    for (const field of document.querySelectorAll(STEERED)) field.inert = !steers;
     if (steers) fit();
 }
 
@@ -325,7 +338,7 @@ function draw() {
     compare.draw({ ...tone, overlay: 0, greatest: 1 });
     times.drawn(picture);
     setText("times", times.text);
-    asked.tone = tone;
+    drawn = tone;
     showValue();
 }
 
@@ -364,7 +377,7 @@ function showCentre() {
 }
 
 function showValue() {
-    if (asked.tone) inspector.show(pointed, picture, asked.tone);
+    if (drawn) inspector.show(pointed, picture, drawn);
     overlay.show(pointed);
 }
 

@@ -1,5 +1,5 @@
-// The picture as far as it has come: four floats a pixel. The last is the mark of an overlay or, without one, the negative coarseness. Coarse pixels fill step x
-// step ones.
+// The picture as far as it has come: four floats a pixel. The last is the mark of an overlay or, without one,
+// the negative coarseness. Coarse pixels fill step x step ones.
 
 export class Picture {
     #marks;
@@ -11,7 +11,8 @@ export class Picture {
         this.size = size;
         this.data = new Float32Array(4 * size[0] * size[1]);
         this.mark(() => [-1, -1]);
-        // Number of the picture, the coarseness of its newest tile, and pixels that have come of that coarseness.
+        // Number of the picture, the coarseness of its newest tile, and pixels that have come of that
+        // coarseness.
         this.version = 0;
         this.step = Infinity;
         this.samples = 0;
@@ -97,7 +98,8 @@ export class Picture {
         }
     }
 
-    // Marks tiles by a function of a tile: the mark of its pixels, and that of those at its edges. Negative ones are not shown.
+    // Marks tiles by a function of a tile: the mark of its pixels, and that of those at its edges. Negative
+    // ones are not shown.
     mark(marks) {
         this.#marks = marks;
         this.#peak = this.greatest = -1;

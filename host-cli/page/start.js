@@ -1,5 +1,6 @@
 // The beginning of a page that has its own host: scenes to choose, and files that are dropped.
 
+import { isMap } from "./environment.js";
 import { element } from "./fields.js";
 import { viewOf } from "./words.js";
 import { unzipped } from "./zip.js";
@@ -102,7 +103,7 @@ export class Start {
         const entries = [...event.dataTransfer.items].map(item => item.webkitGetAsEntry?.()).filter(entry => entry);
         const files = [...event.dataTransfer.files];
         // Maps are for the scene that is shown.
-        if (byId("start").hidden && files.every(({ name }) => /\.(hdr|exr)$/i.test(name))) return;
+        if (byId("start").hidden && files.every(isMap)) return;
         const pairs = entries.length > 0 ? (await Promise.all(entries.map(entry => filesOf(entry, "")))).flat() : files.map(file => [file.name, file]);
         this.take(pairs);
     }

@@ -1,5 +1,6 @@
-// Tiles and files as they come from the command. A tile has a head of eleven little-endian words, and pixels of three floats; a
-// file has a word that no tile begins with, the length of its name, the name and its bytes.
+// Tiles and files as they come from the command. A tile has a head of eleven little-endian words, and pixels
+// of three floats; a file has a word that no tile begins with, the length of its name, the name and its
+// bytes.
 
 const HEAD = 44;
 const FILE_HEAD = 8;

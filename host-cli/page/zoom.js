@@ -8,7 +8,8 @@ export const putAt = ({ style }, place) =>
     ["left", "top", "width", "height"].forEach((side, at) => style[side] = `${place[at]}px`);
 
 export class Zoom {
-    // Factor beyond the fitting size, and the point of the picture in the middle of the stage, as shares of its sides.
+    // Factor beyond the fitting size, and the point of the picture in the middle of the stage, as shares of
+    // its sides.
     factor = 1;
     #centre = [0.5, 0.5];
 

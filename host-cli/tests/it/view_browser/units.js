@@ -6,6 +6,10 @@
     const { decoded } = await import("/tiles.js");
     const tone = await import("/tone.js");
     const { hexOf, linearOf } = await import("/fields.js");
+    const { History } = await import("/history.js");
+    const { histogram } = await import("/inspector.js");
+    const { fileOf } = await import("/tiles.js");
+    const { Zoom } = await import("/zoom.js");
 
     const faults = [];
     const check = (holds, what) => holds || faults.push(what);
@@ -122,6 +126,51 @@
     pace.soon();
     await frames(2);
     check(drawn.length === 3 && !pace.isWaiting, "one that cannot wait takes its place");
+
+    // A room keeps the camera: an orbit comes closer to its centre, other moves end at the wall.
+    const bounds = { low: [-2, 0, -1], high: [2, 2, 1] };
+    const room = camera.roomOf({ position: [0, 1, 0] }, bounds);
+    check(room && camera.roomOf({ position: [0, 1, 1.2] }, bounds) === null, "a camera outside has no room");
+    for (let round = 0; round < 200; round++) {
+        const view = { position: point(), look_at: point(), fov: 50 };
+        const centre = [random() - 0.5, 1, random() - 0.5];
+        const [orbit, move] = [camera.kept(view, room, centre), camera.kept(view, room)];
+        check([orbit, move].every(kept => camera.roomOf(kept, bounds)), "it stays inside");
+        const way = camera.sub(view.position, centre), short = camera.sub(orbit.position, centre);
+        check(near(camera.scaled(way, camera.length(short) / camera.length(way)), short, 1e-9), "an orbit keeps the line to its centre");
+        check(near(camera.axes(view).forward, camera.axes(orbit).forward), "the camera looks where it did");
+    }
+
+    // Undo and redo.
+    const history = new History();
+    for (const fov of [1, 2, 2, 3]) history.note({ fov });
+    check(history.undone().fov === 2 && history.undone().fov === 1 && history.undone() === null, "cameras are undone");
+    check(history.redone().fov === 2 && history.canRedo, "and redone");
+    history.note({ fov: 2 });
+    check(history.canRedo, "a camera that was visited forgets none");
+    history.note({ fov: 4 });
+    check(!history.canRedo && history.undone().fov === 2, "another one forgets those that were undone");
+
+    // Zoom about a point, which stays; no edge of a larger picture comes inside.
+    const zoom = new Zoom();
+    check(near(zoom.place([100, 80], [100, 50]), [0, 15, 100, 50]), "a fitted picture is in the middle");
+    zoom.by(4, [25, 40], [100, 80], [100, 50]);
+    check(near(zoom.place([100, 80], [100, 50]), [-75, -60, 400, 200], 1e-6), "the point stays");
+    zoom.shift([900, -900], [100, 50]);
+    check(near(zoom.place([100, 80], [100, 50]), [0, -120, 400, 200], 1e-6), "the edges stay outside");
+
+    // Files, and what is no file.
+    const sent = new Uint8Array([255, 255, 255, 255, 2, 0, 0, 0, 97, 98, 7, 8]);
+    const file = fileOf(sent.buffer);
+    check(file.name === "ab" && file.bytes.join() === "7,8", "a file has name and bytes");
+    check(fileOf(sent.slice(0, 9).buffer) === null && fileOf(new Uint8Array(44).buffer) === null, "a tile is no file");
+    check(decoded(sent.buffer) === null, "a file is no tile");
+
+    // A histogram in stops about middle grey.
+    const greys = new Float32Array([0.18, 0.36, 0, 0, 0, 0, 0, 0, 90, 90, 90, 0, 0.18, 0.18, 0.18, 0]);
+    const counted = histogram(greys, { mode: tone.MODES.light, scale: 1, curve: "none" });
+    check(counted.black === 0.25 && counted.clipped === 0.25, `black ${counted.black}, clipped ${counted.clipped}`);
+    check(counted.bars[0][40] === 0.5 && counted.bars[1][44] === 0.25 && counted.bars[2][63] === 0.25, "a stop is four bars");
 
     // Tone mapping, with the values that `photoncard tonemap` has.
     const grey = (curve, value) => tone.codes([value, value, value], { mode: tone.MODES.light, scale: 1, curve })[1];
