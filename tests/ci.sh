@@ -102,6 +102,18 @@ find_browser() {
     skip "the page of the live view" "$PHOTONCARD_SKIP_BROWSER"
 }
 
+# The module of the page that has its own host. Tests do not need the optimisation of the whole program, which takes minutes.
+find_module() {
+    unset PHOTONCARD_TEST_MODULE
+    rustup target add wasm32-wasip1 || {
+        skip "the page that has its own host" "rustup cannot add wasm32-wasip1"
+        return
+    }
+    PHOTONCARD_TEST_MODULE=$(realpath -m "${CARGO_TARGET_DIR:-target}")/photoncard.wasm
+    export PHOTONCARD_TEST_MODULE
+    CARGO_PROFILE_PAGE_LTO=off CARGO_PROFILE_PAGE_CODEGEN_UNITS=16 host-cli/module.sh "$PHOTONCARD_TEST_MODULE"
+}
+
 # The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, Node.js for the job type of
 # Flamenco, and the runner of Open Job Description.
 install_openjd() {
@@ -166,13 +178,12 @@ check_lint() {
         fi
     done
 
-    # Scenes, maps, pictures and sessions need no operating system: a browser has none.
-    step "check for wasm32-unknown-unknown"
-    if rustup target add wasm32-unknown-unknown; then
-        cargo clippy -p photoncard-map -p photoncard-cards --target wasm32-unknown-unknown --locked -- -D warnings
-        RUSTFLAGS=$wasm_vectors cargo clippy -p photoncard-firmware --target wasm32-unknown-unknown --locked -- -D warnings
+    # The host and the cards of a page, which a browser runs.
+    step "check for wasm32-wasip1"
+    if rustup target add wasm32-wasip1; then
+        RUSTFLAGS=$wasm_vectors cargo clippy -p photoncard-browser --target wasm32-wasip1 --locked -- -D warnings
     else
-        skip "the check of what a browser runs" "rustup cannot add wasm32-unknown-unknown"
+        skip "the check of what a browser runs" "rustup cannot add wasm32-wasip1"
     fi
 }
 
@@ -226,6 +237,7 @@ test_wasm() {
 check_test() {
     find_qemu
     find_browser
+    find_module
     find_farms
     find_denoiser
     find_operations

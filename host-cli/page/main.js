@@ -74,7 +74,7 @@ const overlay = new Overlay(picture, showLayer);
 function show() {
     drawing.soon();
     sending.soon();
-    showStatus(isOpen, state, png());
+    showStatus(isOpen, hasHost, state, png());
 }
 
 const send = (what, message) => {
@@ -166,7 +166,7 @@ function open(files, words) {
     scene = state = null;
     isCameraOwn = false;
     Object.assign(asked, { layer: "radiance", size: null, started: null, camera: "" });
-    byId("progress").textContent = "Reading the scene.";
+    show();
     const cards = Math.max(1, Math.min(navigator.hardwareConcurrency ?? 1, MAX_CARDS));
     connection.open(files, [...words, "--card", `emulated:${cards}`]);
 }

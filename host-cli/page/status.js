@@ -6,6 +6,7 @@ const MESSAGE_TIME = 8000;
 const HINT_TIME = 4000;
 
 const progress = {
+    reading: () => "Reading the scene.",
     lost: () => "No connection: trying again. A command that was started anew prints another address.",
     refused: state => `Refused: ${state.refused}`,
     settled: () => "Finished: the command below renders this picture, to the last bit.",
@@ -14,8 +15,9 @@ const progress = {
             : `Getting better: ${state.samples} of ${state.spp} samples a pixel.`,
 };
 
-export function showStatus(isOpen, state, more) {
-    const name = !isOpen ? "lost" : state?.refused ? "refused" : state?.settled ? "settled" : "working";
+// A page that has its own host never loses it on the way: it reads a scene, or asks for one.
+export function showStatus(isOpen, hasHost, state, more) {
+    const name = !isOpen ? hasHost ? "reading" : "lost" : state?.refused ? "refused" : state?.settled ? "settled" : "working";
     byId("status").dataset.state = name;
     setText("progress", progress[name](state));
     if (state) setText("command", state.command + more);

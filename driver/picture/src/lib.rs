@@ -27,7 +27,6 @@ pub mod foreign;
 pub mod heading;
 pub mod intact;
 pub mod layer;
-#[cfg(not(target_os = "unknown"))]
 pub mod output;
 pub mod printable;
 pub mod sink;

@@ -17,11 +17,9 @@ use thiserror::Error;
 
 use crate::choice::{Choice, choices};
 use crate::exr::{PROVENANCE, ascii};
-#[cfg(not(target_os = "unknown"))]
 use crate::false_color::ColourPicture;
 use crate::foreign;
 use crate::intact;
-#[cfg(not(target_os = "unknown"))]
 use crate::output::{self, OutputError};
 
 /// Tone curve that compresses scaled radiance to the range of a screen.
@@ -96,7 +94,6 @@ const MIDDLE_GREY: f64 = 0.18;
 #[non_exhaustive]
 pub enum PngError {
     /// The file cannot be written.
-    #[cfg(not(target_os = "unknown"))]
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The encoder refused the picture.
@@ -138,7 +135,6 @@ pub enum PngError {
 /// # Errors
 /// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x
 /// `height` pixels.
-#[cfg(not(target_os = "unknown"))]
 pub fn write_png(
     path: &Path,
     [width, height]: [u32; 2],
@@ -156,7 +152,6 @@ pub fn write_png(
 ///
 /// # Errors
 /// If the file cannot be written.
-#[cfg(not(target_os = "unknown"))]
 pub fn write_colours(
     path: &Path,
     picture: &ColourPicture,

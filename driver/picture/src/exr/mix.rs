@@ -25,7 +25,6 @@ use crate::allocation::{self, OutOfMemory};
 use crate::film::PixelValue;
 use crate::foreign;
 use crate::intact::{self, BLANK};
-#[cfg(not(target_os = "unknown"))]
 use crate::output;
 
 /// Factors of a light group's light, by channel: `NAME=FACTOR` or `NAME=R,G,B`.
@@ -370,7 +369,6 @@ impl Mix {
     ///
     /// # Errors
     /// If the file cannot be written.
-    #[cfg(not(target_os = "unknown"))]
     pub fn write(self, path: &Path) -> Result<(), MixError> {
         let bytes = self.bytes()?;
         Ok(output::write(path, &bytes).map_err(ExrError::from)?)

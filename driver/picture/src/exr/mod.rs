@@ -33,7 +33,6 @@ use crate::film::Film;
 use crate::foreign;
 use crate::intact::{self, BLANK};
 use crate::layer::{COLOUR_ALPHA, Channel, Layers};
-#[cfg(not(target_os = "unknown"))]
 use crate::output::{self, OutputError};
 
 /// Name of the attribute that holds the picture's provenance.
@@ -84,7 +83,6 @@ impl RgbImage {
 #[non_exhaustive]
 pub enum ExrError {
     /// The file cannot be written.
-    #[cfg(not(target_os = "unknown"))]
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The encoder refused the picture.
@@ -188,7 +186,6 @@ const ILLUMINANCE: &str = "illuminance.Y";
 ///
 /// # Errors
 /// If the file cannot be written, or the provenance is empty.
-#[cfg(not(target_os = "unknown"))]
 pub fn write(
     path: &Path,
     content: &Content,
