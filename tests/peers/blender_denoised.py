@@ -6,7 +6,8 @@
 PYTHON has the packages bpy and numpy; NAME is room, product or plan. photoncard renders the quality `good` with
 `--denoise`; counted is the whole command, user and system: reading the scene, pilot, photons, samples, denoiser. Cycles
 has as many samples as fit that time by the cost of two short renders, its own Open Image Denoise with albedo and normals, and
-adaptive sampling; counted is the call that renders. Both have box filters of a pixel. Cycles clamps no light.
+adaptive sampling; counted is the call that renders. Both have box filters of a pixel. Cycles clamps no light. Textures are
+not interpolated: between texels of 8 bits Cycles interpolates encoded values, photoncard linear ones as glTF has it.
 
 The reference is the mean of two pictures of Cycles that are not denoised, of --samples each. Columns: the mean over that
 of the reference; the root of the mean square of relative errors, and its part in blocks of 8x8 pixels, where noise of pixels
@@ -75,6 +76,10 @@ def compare(arguments: argparse.Namespace, name: str) -> list[str]:
     scene.render.resolution_x, scene.render.resolution_y = arguments.width, arguments.width * 9 // 16
     rendering.use_cycles(scene, 1)
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
+    for material in bpy.data.materials:
+        for node in material.node_tree.nodes:
+            if node.bl_idname == "ShaderNodeTexImage":
+                node.interpolation = "Closest"
     with tempfile.TemporaryDirectory() as folder:
         ours, seconds = photoncard(arguments.photoncard, scene, Path(folder))
         samples = samples_in(scene, seconds, Path(folder))
