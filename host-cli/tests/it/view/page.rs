@@ -178,7 +178,7 @@ impl Page {
             }
             match self.socket.read().unwrap() {
                 Message::Binary(bytes) => self.receive(&bytes),
-                Message::Text(text) => assert!(!text.contains("\"error\""), "{text}"),
+                Message::Text(text) => assert!(!text.contains("\"type\":\"error\""), "{text}"),
                 _ => {}
             }
         }

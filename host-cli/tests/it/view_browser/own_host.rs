@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use data_encoding::BASE64;
-use serde_json::json;
 
 use super::browser::{Browser, Tab};
 use super::person::{Person, SETTLED};
@@ -78,7 +77,7 @@ fn a_page_with_its_own_host_settles_to_the_picture_of_the_shown_command() {
     tab.check_walls();
 
     // A change of light, as on every page.
-    tab.switch("lamp");
+    tab.switch("light");
     check_shown(&room, &mut tab);
 
     open(&mut tab, &server, &format!("photoncard render scenes/room.glb {SMALL}"));
