@@ -77,7 +77,8 @@ fn a_page_with_its_own_host_settles_to_the_picture_of_the_shown_command() {
     tab.check_walls();
 
     // A change of light, as on every page.
-    tab.switch("light");
+    tab.value("photoncard.connection.send({type: 'set', name: 'light.emission', value: 3})");
+    tab.wait("photoncard.state.version > 1", LIMIT);
     check_shown(&room, &mut tab);
 
     open(&mut tab, &server, &format!("photoncard render scenes/room.glb {SMALL}"));
