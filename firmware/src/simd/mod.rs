@@ -2,10 +2,10 @@
 //!
 //! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same operation. It is compiled
 //! for each [`Isa`] that the processor may have. A WebAssembly program cannot ask: with `simd128` the whole
-//! program needs it, and a browser that lacks it refuses the program. Compilers turn the loops into vector instructions;
-//! operations that they do not recognise in loops, such as comparing and packing lanes, are methods of the
-//! `Isa`. Every lane rounds like scalar code and no operations are fused, so that all instruction sets give
-//! the same bits. [`Portable`] is the fallback for every processor.
+//! program needs it, and a browser that lacks it refuses the program. Compilers turn the loops into vector
+//! instructions; operations that they do not recognise in loops, such as comparing and packing lanes, are
+//! methods of the `Isa`. Every lane rounds like scalar code and no operations are fused, so that all
+//! instruction sets give the same bits. [`Portable`] is the fallback for every processor.
 
 mod kernel;
 #[cfg(all(target_family = "wasm", target_feature = "simd128"))]

@@ -3,8 +3,8 @@
 //!
 //! The module is called by `page/host.js` and `page/chip.js`. Bytes come in the buffer that [`buffer`] gives;
 //! they leave by the imported functions. Files and the clock are those of WASI (`page/wasi.js`).
-#![expect(unsafe_code, reason = "functions that a page calls, and that it offers")]
 #![cfg(target_family = "wasm")]
+#![expect(unsafe_code, reason = "functions that a page calls, and that it offers")]
 
 mod card;
 mod host;

@@ -193,8 +193,8 @@ impl View {
         hello.to_string()
     }
 
-    /// Replaces the scene by one that was read again from its files with `options`. Edits of pages stay if they are possible
-    /// in it. Pages are greeted anew.
+    /// Replaces the scene by one that was read again from its files with `options`. Edits of pages stay if
+    /// they are possible in it. Pages are greeted anew.
     ///
     /// # Errors
     /// If the picture cannot be rendered of this scene; the view keeps the one before.

@@ -38,7 +38,8 @@ fn brighten(tab: &mut Tab, strength: f64) {
     tab.wait(&format!("photoncard.state.version > {version} && {SETTLED}"), LIMIT);
 }
 
-/// However far a drag turns the camera, it ends inside, and the page says why. It can be let out, and goes back.
+/// However far a drag turns the camera, it ends inside, and the page says why. It can be let out, and goes
+/// back.
 #[test]
 fn the_camera_stays_in_the_room_and_goes_back() {
     let Some(mut browser) = Browser::start() else { return };
