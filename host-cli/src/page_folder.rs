@@ -1,7 +1,7 @@
 //! Command `photoncard page`: a page that has its own host, as files for any web server.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::output;
@@ -11,10 +11,14 @@ use serde_json::{Value, json};
 use crate::arguments::PageOptions;
 use crate::console::print;
 use crate::failure::Failure;
-use crate::view::page_files::{PAGE_MODULE, pages};
+use crate::view::page_files::pages;
 
 /// Name of the module in the folder.
 const MODULE: &str = "photoncard.wasm";
+/// Place of the module in a package, from the folder of the program.
+const PACKED: &str = "../share/photoncard/photoncard.wasm";
+/// List of the files that a page keeps for use without a network.
+const LIST: &str = "files.json";
 /// First bytes of a WebAssembly module.
 const MAGIC: &[u8] = b"\0asm";
 /// Line of `index.html` that says where the host is.
@@ -26,14 +30,25 @@ const OWN_HOST: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"d
 /// What the service worker has in place of the version.
 const VERSION: &str = "VERSION";
 
+/// Name of a file in the folder, and its contents.
+type File = (String, Vec<u8>);
+
 /// Writes the folder of a page.
 pub(crate) fn run(options: &PageOptions) -> Result<(), Failure> {
     let module = module(options.module.as_deref())?;
-    let scenes: Vec<(String, Vec<u8>)> =
-        options.scenes.iter().map(|path| scene(path)).collect::<Result<_, _>>()?;
+    let scenes = scenes(&options.scenes)?;
     let folder = &options.folder;
     check_folder(folder)?;
-    let mut files: Vec<(String, Vec<u8>)> = vec![(MODULE.into(), module)];
+    let files = files(module, scenes);
+    for (name, bytes) in &files {
+        write(&folder.join(name), bytes)?;
+    }
+    print(&[format!("{}: {} files, for any web server", folder.display(), files.len())])
+}
+
+/// Files of a page with its module and its scenes.
+fn files(module: Vec<u8>, scenes: Vec<File>) -> Vec<File> {
+    let mut files = vec![(MODULE.to_owned(), module)];
     let list: Vec<Value> =
         scenes.iter().map(|(file, _)| json!({ "file": file, "title": title(file) })).collect();
     files.push(("scenes.json".into(), json!(list).to_string().into_bytes()));
@@ -49,43 +64,30 @@ pub(crate) fn run(options: &PageOptions) -> Result<(), Failure> {
     let names = files.iter().map(|(name, _)| name.as_str()).filter(|name| *name != "offline.js");
     let names: Vec<&str> = ["./"].into_iter().chain(names).collect();
     files.push((LIST.into(), json!(names).to_string().into_bytes()));
-    for (name, bytes) in &files {
-        write(&folder.join(name), bytes)?;
-    }
-    print(&[format!("{}: {} files, for any web server", folder.display(), files.len())])
+    files
 }
-
-/// List of the files that a page keeps for use without a network.
-const LIST: &str = "files.json";
 
 /// Checks that a folder is new, empty, or one that this command has written.
 fn check_folder(folder: &Path) -> Result<(), Failure> {
     let is_foreign = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some())
         && !folder.join(LIST).is_file();
     if is_foreign {
-        let text = format!("{} has other files", folder.display());
-        return Err(Failure::Input(Report::new(
-            MietteDiagnostic::new(text).with_help("state a new or empty folder"),
-        )));
+        return Err(refused(format!("{} has other files", folder.display()), "state a new or empty folder"));
     }
     Ok(())
 }
 
-/// Reads the module, or takes that of this program.
+/// Reads the module: the stated one, or that of this program's package.
 fn module(stated: Option<&Path>) -> Result<Vec<u8>, Failure> {
-    let refused = |text: String, help: &str| {
-        Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help.to_owned())))
+    let packed = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join(PACKED)));
+    let packed = packed.filter(|path| stated.is_none() && path.is_file());
+    let Some(path) = stated.or(packed.as_deref()) else {
+        return Err(refused(
+            "the module of a page is not beside this program".to_owned(),
+            "build it by host-cli/module.sh FILE, and state it: --module FILE",
+        ));
     };
-    let Some(path) = stated else {
-        return PAGE_MODULE.map(<[u8]>::to_vec).ok_or_else(|| {
-            refused(
-                "this program was built without the module of a page".into(),
-                "build it by host-cli/module.sh FILE, and state it: --module FILE; released programs have it",
-            )
-        });
-    };
-    let bytes = fs::read(path)
-        .map_err(|error| refused(format!("cannot read {}: {error}", path.display()), "check the path"))?;
+    let bytes = read(path)?;
     if !bytes.starts_with(MAGIC) {
         return Err(refused(
             format!("{} is no WebAssembly module", path.display()),
@@ -95,13 +97,31 @@ fn module(stated: Option<&Path>) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path)
+        .map_err(|error| refused(format!("cannot read {}: {error}", path.display()), "check the path"))
+}
+
+fn refused(text: String, help: &str) -> Failure {
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
+
+/// Reads scenes for the page's list.
+fn scenes(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
+    let mut scenes: Vec<File> = Vec::new();
+    for path in paths {
+        let scene = scene(path)?;
+        if scenes.iter().any(|(name, _)| *name == scene.0) {
+            return Err(refused(format!("two scenes have the name {}", scene.0), "rename one of them"));
+        }
+        scenes.push(scene);
+    }
+    Ok(scenes)
+}
+
 /// Reads a scene for the page's list, under `scenes/` in the folder.
-fn scene(path: &Path) -> Result<(String, Vec<u8>), Failure> {
-    let refused = |text: String, help: &str| {
-        Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help.to_owned())))
-    };
-    let bytes = fs::read(path)
-        .map_err(|error| refused(format!("cannot read {}: {error}", path.display()), "check the path"))?;
+fn scene(path: &Path) -> Result<File, Failure> {
+    let bytes = read(path)?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let is_whole = bytes.starts_with(b"glTF") || !names_files(&bytes);
     if !is_whole {
@@ -130,7 +150,7 @@ fn title(file: &str) -> String {
 }
 
 /// Number that changes with any byte of the files.
-fn version(files: &[(String, Vec<u8>)]) -> String {
+fn version(files: &[File]) -> String {
     let mut checksum = Checksum::default();
     for (name, bytes) in files {
         checksum.update(name.as_bytes());

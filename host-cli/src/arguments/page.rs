@@ -12,7 +12,7 @@ pub(crate) struct PageOptions {
     /// A scene to choose on the page: a file .glb, or a .gltf that names no other files; repeated for more
     #[arg(long = "scene", value_name = "SCENE")]
     pub(crate) scenes: Vec<PathBuf>,
-    /// The WebAssembly module, by host-cli/module.sh, in place of this program's
+    /// The WebAssembly module, by host-cli/module.sh [default: that of the program's package]
     #[arg(long, value_name = "FILE")]
     pub(crate) module: Option<PathBuf>,
 }

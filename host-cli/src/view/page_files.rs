@@ -15,13 +15,6 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const DRAWING: &str = "image/svg+xml";
 const MANIFEST: &str = "application/manifest+json";
 
-/// The WebAssembly module of a page that has its own host, if this program was built with it.
-#[cfg(has_module)]
-pub(crate) const PAGE_MODULE: Option<&[u8]> = Some(include_bytes!(env!("PHOTONCARD_MODULE")));
-/// The WebAssembly module of a page that has its own host, if this program was built with it.
-#[cfg(not(has_module))]
-pub(crate) const PAGE_MODULE: Option<&[u8]> = None;
-
 macro_rules! files {
     ($($kind:ident $name:literal),+ $(,)?) => {
         [$(PageFile { name: $name, kind: $kind, text: include_str!(concat!("../../page/", $name)) }),+]
