@@ -102,6 +102,13 @@ find_browser() {
     skip "the page of the live view" "$PHOTONCARD_SKIP_BROWSER"
 }
 
+find_firefox() {
+    unset PHOTONCARD_SKIP_FIREFOX
+    command -v firefox >/dev/null || command -v firefox-esr >/dev/null || install Firefox firefox-esr && return
+    export PHOTONCARD_SKIP_FIREFOX="Firefox is missing and could not be installed"
+    skip "the page that has its own host in Firefox" "$PHOTONCARD_SKIP_FIREFOX"
+}
+
 # The module of the page that has its own host. Tests do not need the optimisation of the whole program, which takes minutes.
 find_module() {
     unset PHOTONCARD_TEST_MODULE
@@ -237,6 +244,7 @@ test_wasm() {
 check_test() {
     find_qemu
     find_browser
+    find_firefox
     find_module
     find_farms
     find_denoiser

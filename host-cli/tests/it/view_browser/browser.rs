@@ -98,6 +98,33 @@ fn announced(process: &mut Child) -> String {
     receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its DevTools")
 }
 
+/// Page in a browser, whose scripts can be called.
+pub(crate) trait Scripted {
+    /// Opens an address.
+    fn open(&mut self, address: &str);
+
+    /// Evaluates a JavaScript expression, and waits for its value if it is a promise.
+    fn value(&mut self, expression: &str) -> Value;
+
+    /// Waits until a JavaScript expression is true.
+    fn wait(&mut self, expression: &str, limit: Duration) {
+        let start = Instant::now();
+        while self.value(&format!("Boolean({expression})")) != true {
+            if start.elapsed() > limit {
+                let seen =
+                    self.value("document.body.innerText + ' ' + JSON.stringify(window.photoncard?.state)");
+                panic!("not within {limit:?}: {expression}; the page shows {seen}; {:?}", self.faults());
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Errors of the page's scripts and resources, as far as they are recorded.
+    fn faults(&self) -> &[String] {
+        &[]
+    }
+}
+
 /// Tab of the browser, with a `DevTools` connection.
 pub(crate) struct Tab {
     socket: WebSocket<TcpStream>,
@@ -140,31 +167,6 @@ impl Tab {
                 self.faults.push(parameters["entry"].to_string());
             }
             _ => (),
-        }
-    }
-
-    pub(crate) fn open(&mut self, address: &str) {
-        self.call("Page.navigate", &json!({"url": address}));
-    }
-
-    /// Evaluates a JavaScript expression, and waits for its value if it is a promise.
-    pub(crate) fn value(&mut self, expression: &str) -> Value {
-        let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
-        let result = self.call("Runtime.evaluate", &parameters);
-        assert!(result["exceptionDetails"].is_null(), "{expression}: {}", result["exceptionDetails"]);
-        result["result"]["value"].clone()
-    }
-
-    /// Waits until a JavaScript expression is true.
-    pub(crate) fn wait(&mut self, expression: &str, limit: Duration) {
-        let start = Instant::now();
-        while self.value(&format!("Boolean({expression})")) != true {
-            if start.elapsed() > limit {
-                let seen =
-                    self.value("document.body.innerText + ' ' + JSON.stringify(window.photoncard?.state)");
-                panic!("not within {limit:?}: {expression}; the page shows {seen}; {:?}", self.faults);
-            }
-            std::thread::sleep(Duration::from_millis(20));
         }
     }
 
@@ -244,6 +246,23 @@ impl Tab {
         let clip = json!({"x": x, "y": y, "width": width, "height": height, "scale": 1});
         let shot = self.call("Page.captureScreenshot", &json!({"format": "png", "clip": clip}));
         decoded(&BASE64.decode(shot["data"].as_str().unwrap().as_bytes()).unwrap())
+    }
+}
+
+impl Scripted for Tab {
+    fn open(&mut self, address: &str) {
+        self.call("Page.navigate", &json!({"url": address}));
+    }
+
+    fn value(&mut self, expression: &str) -> Value {
+        let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let result = self.call("Runtime.evaluate", &parameters);
+        assert!(result["exceptionDetails"].is_null(), "{expression}: {}", result["exceptionDetails"]);
+        result["result"]["value"].clone()
+    }
+
+    fn faults(&self) -> &[String] {
+        &self.faults
     }
 }
 

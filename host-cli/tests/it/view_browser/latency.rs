@@ -5,7 +5,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
 
-use super::browser::{Browser, Tab};
+use super::browser::{Browser, Scripted, Tab};
 use super::server::View;
 use crate::support::{Room, shipped};
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::browser::{Browser, Tab};
+use super::browser::{Browser, Scripted, Tab};
 use super::person::{Person, SETTLED};
 use super::server::{View, run_shown};
 use super::{LIMIT, SMALL, WINDOW, opened};

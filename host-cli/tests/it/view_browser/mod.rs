@@ -3,6 +3,7 @@
 
 mod browser;
 mod devices;
+mod firefox;
 mod latency;
 mod lighting;
 mod own_host;
@@ -13,7 +14,7 @@ mod server;
 use std::time::Duration;
 
 use crate::support::{Room, shipped};
-use browser::{Browser, Tab, decoded};
+use browser::{Browser, Scripted, Tab, decoded};
 use person::{Person, SETTLED, darkness};
 use serde_json::json;
 use server::{View, run_shown, serve_page};

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use data_encoding::BASE64;
 
-use super::browser::{Browser, Tab};
+use super::browser::{Browser, Scripted};
+use super::firefox::Firefox;
 use super::person::{Person, SETTLED};
 use super::server::{FileServer, run_shown};
 use crate::support::{Room, shipped, skip};
@@ -34,26 +35,26 @@ fn site(room: &Room) -> Option<FileServer> {
 }
 
 /// Opens the picture of a command line by the page's address.
-fn open(tab: &mut Tab, server: &FileServer, line: &str) {
+fn open(tab: &mut impl Scripted, server: &FileServer, line: &str) {
     tab.open("about:blank");
     let encoded: String = line.bytes().map(|byte| format!("%{byte:02X}")).collect();
     tab.open(&format!("{}#{encoded}", server.address));
 }
 
 /// Downloads the settled picture as an EXR, and returns its bytes.
-fn downloaded(tab: &mut Tab) -> Vec<u8> {
+fn downloaded(tab: &mut impl Scripted) -> Vec<u8> {
     tab.value(
-        "window.taken = null; URL.createObjectURL = blob => { blob.arrayBuffer().then(bytes => \
+        "(() => { window.taken = null; URL.createObjectURL = blob => { blob.arrayBuffer().then(bytes => \
          window.taken = btoa(Array.from(new Uint8Array(bytes), byte => String.fromCharCode(byte)).join(''))); return 'blob:none'; }; \
-         HTMLAnchorElement.prototype.click = () => { }; 0",
+         HTMLAnchorElement.prototype.click = () => { }; return 0; })()",
     );
-    tab.click("save-exr");
+    tab.value("document.getElementById('save-exr').click()");
     tab.wait("window.taken", LIMIT);
     BASE64.decode(tab.value("window.taken").as_str().unwrap().as_bytes()).unwrap()
 }
 
 /// Checks that the downloaded EXR equals the one that the shown command line writes.
-fn check_shown(room: &Room, tab: &mut Tab) {
+fn check_shown(room: &Room, tab: &mut impl Scripted) {
     tab.wait(SETTLED, LIMIT);
     let line = tab.value("document.getElementById('command').textContent");
     let line = line.as_str().unwrap();
@@ -84,6 +85,17 @@ fn a_page_with_its_own_host_settles_to_the_picture_of_the_shown_command() {
     open(&mut tab, &server, &format!("photoncard render scenes/room.glb {SMALL}"));
     check_shown(&room, &mut tab);
     assert_eq!(tab.faults, Vec::<String>::new());
+}
+
+#[test]
+fn firefox_settles_to_the_same_picture() {
+    let Some(mut firefox) = Firefox::start() else { return };
+    let room = Room::new();
+    let Some(server) = site(&room) else { return };
+    std::fs::create_dir_all(room.path("scenes")).unwrap();
+    std::fs::copy(shipped("cornell.gltf"), room.path("scenes/cornell.gltf")).unwrap();
+    open(&mut firefox, &server, &format!("photoncard render scenes/cornell.gltf {SMALL}"));
+    check_shown(&room, &mut firefox);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::browser::Tab;
+use super::browser::{Scripted, Tab};
 use crate::support::shipped;
 
 /// JavaScript expression that is true once the page shows the final picture with all changes.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::browser::Tab;
+use super::browser::{Scripted, Tab};
 use super::person::Person;
 use crate::support::{Emulator, Room};
 
