@@ -168,7 +168,7 @@ function open(files, words) {
     Object.assign(asked, { layer: "radiance", size: null, started: null, camera: "" });
     show();
     const cards = Math.max(1, Math.min(navigator.hardwareConcurrency ?? 1, MAX_CARDS));
-    connection.open(files, [...words, "--card", `emulated:${cards}`]);
+    connection.open(files, words.includes("--card") ? words : [...words, "--card", `emulated:${cards}`]);
 }
 
 function take(message) {
