@@ -22,10 +22,10 @@ export async function render(scene, options = {}) {
         session.open(files, [...words, "--", name]);
         const { size: [width, height], command } = await session.settled();
         const pixels = session.pixels;
-        const layers = {};
-        for (const layer of shown) layers[layer] = await session.layer(layer);
         const exr = await session.saved({ name: "picture.exr" });
         const png = await session.saved({ name: "picture.png", exposure, tonemap });
+        const layers = {};
+        for (const layer of shown) layers[layer] = await session.layer(layer);
         return { width, height, pixels, layers, command, notices: session.notices, exr: async () => exr, png: async () => png };
     } finally {
         signal?.removeEventListener("abort", abort);
