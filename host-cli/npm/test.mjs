@@ -133,8 +133,8 @@ class Browser {
         }
     }
 
-    async #attach({ sessionId }) {
-        this.workers.add(sessionId);
+    async #attach({ sessionId, targetInfo }) {
+        if (targetInfo.type === "worker") this.workers.add(sessionId);
         await this.#follow(sessionId);
         await this.call("Runtime.runIfWaitingForDebugger", {}, sessionId);
     }
@@ -282,7 +282,8 @@ const tests = {
     async "what cannot be rendered is refused with a sentence"(browser) {
         for (const [call, said] of [
             [`render(new Uint8Array([1, 2, 3]))`, /scene\.glb/],
-            [`render({ "a.gltf": new TextEncoder().encode('{"asset":{"version":"2.0"},"buffers":[{"uri":"b.bin","byteLength":4}]}') })`, /b\.bin|mesh/],
+            [`fetch("cornell.gltf").then(answer => answer.text()).then(text =>
+                render({ "a.gltf": new TextEncoder().encode(text.replace(/data:[^"]*/, "lost.bin")) }))`, /lost\.bin/],
             [`render({ "a.txt": new Uint8Array(1) })`, /none of the files is a scene/],
             [`render({ "a.glb": "text" })`, /a\.glb is neither/],
             [`render("missing.glb")`, /missing\.glb .* 404/],
