@@ -11,7 +11,7 @@ import { fileURLToPath } from "node:url";
 import { inflateSync } from "node:zlib";
 
 const VERSIONS = { typescript: "5.9.3", vite: "8.3.8" };
-const KINDS = { ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm", ".gltf": "model/gltf+json" };
+const KINDS = { ".bin": "application/octet-stream", ".html": "text/html", ".js": "text/javascript", ".wasm": "application/wasm", ".gltf": "model/gltf+json" };
 const POLICY = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'";
 const BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 // Milliseconds.
@@ -25,7 +25,7 @@ if (!module || !program) {
 const here = fileURLToPath(new URL(".", import.meta.url));
 const cornell = join(here, "../../scenes/cornell.gltf");
 const room = mkdtempSync(join(tmpdir(), "photoncard-npm-"));
-const project = join(room, "project");
+const project = join(room, "project"), scenes = join(project, "public");
 
 // A picture that takes a moment and leaves no setting to pilot renders.
 const SMALL = `size: [64, 64], quality: "paper", cards: 2, arguments: "${
@@ -62,8 +62,11 @@ function build() {
     const pack = folder => run(join(here, "pack.sh"), [module, join(room, folder)], process.cwd()).trim();
     const [first, second] = ["first", "second"].map(pack);
     assert(readFileSync(first).equals(readFileSync(second)), "two runs made different packages");
-    mkdirSync(join(project, "public"), { recursive: true });
-    cpSync(cornell, join(project, "public/cornell.gltf"));
+    mkdirSync(join(scenes, "parts/data"), { recursive: true });
+    for (const name of ["cornell.gltf", "scene.glb"]) cpSync(cornell, join(scenes, name));
+    const whole = readFileSync(cornell, "utf8"), [, data] = /"data:[^,"]*,([^"]*)"/.exec(whole);
+    writeFileSync(join(scenes, "parts/cornell.gltf"), whole.replace(/"data:[^"]*"/, '"data/box%201.bin"'));
+    writeFileSync(join(scenes, "parts/data/box 1.bin"), Buffer.from(data, "base64"));
     writeFileSync(join(project, "package.json"), JSON.stringify({ private: true, type: "module" }));
     writeFileSync(join(project, "index.html"), `<!doctype html><link rel="icon" href="data:,"><script type="module" src="/main.ts"></script>`);
     writeFileSync(join(project, "main.ts"), PAGE);
@@ -79,7 +82,7 @@ function build() {
 async function served(folder) {
     const files = new Map(readdirSync(folder, { recursive: true }).map(path => [`/${path}`, join(folder, path)]));
     const server = createServer(({ url }, answer) => {
-        const path = url === "/" ? "/index.html" : url, kind = KINDS[extname(path)];
+        const path = url === "/" ? "/index.html" : decodeURI(url), kind = KINDS[extname(path)];
         if (!files.has(path) || !kind) return answer.writeHead(404).end();
         answer.writeHead(200, { "Content-Type": kind, "Content-Security-Policy": POLICY }).end(readFileSync(files.get(path)));
     });
@@ -212,7 +215,7 @@ function unfiltered(bytes) {
 function checkPicture(result, size) {
     assert.deepEqual([result.width, result.height], size);
     const folder = mkdtempSync(join(room, "command-"));
-    for (const name of ["cornell.gltf", "scene.glb"]) cpSync(cornell, join(folder, name));
+    cpSync(scenes, folder, { recursive: true });
     run("sh", ["-c", `photoncard() { "$PHOTONCARD" "$@" --quiet; }; ${result.command}`], folder);
     const file = readFileSync(join(folder, "picture.exr")), exr = Buffer.from(result.exr, "base64");
     assert(exr.equals(file), `the EXR differs from that of ${result.command}`);
@@ -255,9 +258,11 @@ const tests = {
 
     async "two renders at once have their own pictures"(browser) {
         const [first, second] = await browser.value(`(async () => {
-            const bytes = await (await fetch("cornell.gltf")).arrayBuffer();
+            const of = async path => (await fetch(path)).arrayBuffer();
+            const bytes = await of("cornell.gltf"), data = new Uint8Array(await of("parts/data/box 1.bin"));
+            const files = new Map([["./parts/data/box 1.bin", data], ["parts/cornell.gltf", new Blob([await of("parts/cornell.gltf")])]]);
             return Promise.all((await Promise.all([
-                render(new Map([["cornell.gltf", new Blob([bytes])]]), { ${SMALL} }),
+                render(files, { ${SMALL} }),
                 render(bytes, { ${SMALL}, size: [48, 40], layers: ["direct", "N", "Z"], set: { "light.emission": [9, 10, 11] },
                     camera: { position: [0.1, 0.2, 1.5], lookAt: [0, 0, 0], fov: 50 } }),
             ])).map(plain));
@@ -283,7 +288,7 @@ const tests = {
         for (const [call, said] of [
             [`render(new Uint8Array([1, 2, 3]))`, /scene\.glb/],
             [`fetch("cornell.gltf").then(answer => answer.text()).then(text =>
-                render({ "a.gltf": new TextEncoder().encode(text.replace(/data:[^"]*/, "lost.bin")) }))`, /lost\.bin/],
+                render({ "a.gltf": new TextEncoder().encode(text.replace(/data:[^"]*/, "lost.bin")) }))`, /lost\.bin: No such file/],
             [`render({ "a.txt": new Uint8Array(1) })`, /none of the files is a scene/],
             [`render({ "a.glb": "text" })`, /a\.glb is neither/],
             [`render("missing.glb")`, /missing\.glb .* 404/],
