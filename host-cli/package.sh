@@ -15,6 +15,7 @@ formats, by default all:
   deb        a Debian package; it takes dpkg-deb
   wheel      a wheel of Python: program and package
   blender    the extension of Blender with the program
+  npm        a package of npm with the module that the variable PHOTONCARD_MODULE names; without the variable it is left out
   container  Containerfile, which builds an image from the archive
   sbom       photoncard-VERSION.cdx.json: the crates in the program, CycloneDX
 EOF
@@ -27,6 +28,12 @@ fail() {
 }
 
 all=(tar deb wheel blender container sbom)
+# What host-cli/module.sh has built, from which the package of npm is made.
+if [ -n "${PHOTONCARD_MODULE:-}" ]; then
+    PHOTONCARD_MODULE=$(realpath "$PHOTONCARD_MODULE")
+    export PHOTONCARD_MODULE
+    all+=(npm)
+fi
 formats=() binary="" out="" check=""
 while [ $# -gt 0 ]; do
     case $1 in
@@ -58,6 +65,7 @@ cargo=${CARGO:-cargo}
 [[ $(tar --version 2>/dev/null) == *GNU* ]] || fail "GNU tar is missing; it sorts the names in an archive"
 command -v strip >/dev/null || fail "strip is missing; on Debian: sudo apt-get install binutils"
 ! wants deb || command -v dpkg-deb >/dev/null || fail "dpkg-deb is missing; on Debian: sudo apt-get install dpkg; or name other formats"
+! wants npm || command -v npm >/dev/null || fail "npm is missing; on Debian: sudo apt-get install npm; or name other formats"
 if wants deb || wants wheel || wants blender || wants sbom; then
     command -v python3 >/dev/null || fail "python3 is missing; on Debian: sudo apt-get install python3; or name other formats"
 fi
@@ -187,6 +195,10 @@ pack_wheel() {
 
 pack_blender() {
     python3 host-cli/blender/build.py "$files/bin/photoncard" "$packages" "$files"/LICENSE*-OF-* >/dev/null
+}
+
+pack_npm() {
+    host-cli/npm/pack.sh "$PHOTONCARD_MODULE" "$packages" "$files"/LICENSE*-OF-* >/dev/null
 }
 
 pack_container() {

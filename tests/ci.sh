@@ -307,7 +307,18 @@ test_blender() {
     done
 }
 
-# Packages of a release, the package of Python and the extension of Blender: ten minutes, a stage by its name alone.
+# The package of npm, bundled by Vite, in a browser: its pictures are those of the program.
+test_npm() {
+    find_browser
+    find_module
+    if ! command -v npm >/dev/null && ! install npm nodejs npm; then
+        skip "the package of npm" "npm is missing and could not be installed"
+    elif [ -z "${PHOTONCARD_SKIP_BROWSER:-}" ] && [ -n "${PHOTONCARD_TEST_MODULE:-}" ]; then
+        PHOTONCARD=$1 timeout 900 node host-cli/npm/test.mjs "$PHOTONCARD_TEST_MODULE"
+    fi
+}
+
+# Packages of a release, those of Python and npm and the extension of Blender: twenty minutes, a stage by its name alone.
 check_extensions() {
     step "packages of a release"
     local program=${CARGO_TARGET_DIR:-target}/release/photoncard dist
@@ -318,6 +329,8 @@ check_extensions() {
     test_python "$dist"
     step "extension of Blender"
     test_blender "$dist" "$(realpath "$program")"
+    step "package of npm"
+    test_npm "$(realpath "$program")"
     rm -r "$dist"
 }
 

@@ -9,7 +9,7 @@ import { soonCaller } from "./soon.js";
 // Milliseconds until a host that waits looks at its clocks.
 const LOOK = 20;
 
-const compiled = WebAssembly.compileStreaming(fetch(new URL("photoncard.wasm", import.meta.url)));
+const compiled = WebAssembly.compileStreaming(fetch(new URL("./photoncard.wasm", import.meta.url)));
 const cards = new Map();
 let host = null, isOpen = false, isPaused = false, timer = 0;
 // Where texts of the module go: before the view is open, the reason why it cannot be.
@@ -40,7 +40,7 @@ function fail(reason) {
 
 const functions = {
     start_card(instance, index, at, length) {
-        const worker = new Worker(new URL("chip.js", import.meta.url), { type: "module" });
+        const worker = new Worker(new URL("./chip.js", import.meta.url), { type: "module" });
         cards.get(index)?.terminate();
         cards.set(index, worker);
         worker.onmessage = ({ data }) => {

@@ -2,22 +2,16 @@
 
 import { Link } from "./link.js";
 
+// Its handlers have also `failed(reason)` and `said(line)`.
 export class LocalHost extends Link {
     #worker = null;
     #isOpen = false;
 
-    // `handlers` has also `failed(reason)` and `said(line)`.
-    constructor(handlers) {
-        super(handlers);
-        // A page that nobody sees leaves the processor to others.
-        document.addEventListener("visibilitychange", () => this.#worker?.postMessage({ pause: document.hidden }));
-    }
-
     // Opens the view of a scene: its files, a map from paths to bytes, and the arguments of `photoncard view`.
     open(files, words) {
-        this.#close();
+        this.close();
         this.restart();
-        this.#worker = new Worker(new URL("host.js", import.meta.url), { type: "module" });
+        this.#worker = new Worker(new URL("./host.js", import.meta.url), { type: "module" });
         this.#worker.onmessage = ({ data }) => this.#hear(data);
         this.#worker.onerror = event => this.#fail(`the renderer cannot start: ${event.message ?? "its worker has no answer"}`);
         this.#worker.postMessage({ open: { files, arguments: words } });
@@ -34,11 +28,17 @@ export class LocalHost extends Link {
     }
 
     #fail(reason) {
-        this.#close();
+        this.close();
         this.handlers.failed(reason);
     }
 
-    #close() {
+    // Pauses the host, or lets it go on.
+    pause(isPaused) {
+        this.#worker?.postMessage({ pause: isPaused });
+    }
+
+    // Ends the host with its cards.
+    close() {
         this.#worker?.terminate();
         this.#worker = null;
         if (this.#isOpen) {

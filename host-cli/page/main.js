@@ -493,6 +493,8 @@ new ResizeObserver(() => {
 if (hasHost) {
     byId("copy-link").hidden = byId("other-scene").hidden = false;
     start.show("");
+    // A page that nobody sees leaves the processor to others.
+    document.addEventListener("visibilitychange", () => connection.pause(document.hidden));
     navigator.serviceWorker?.register("offline.js").catch(error => console.info(`not offline: ${error.message}`));
 }
 

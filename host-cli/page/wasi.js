@@ -1,6 +1,6 @@
 // The system that the module asks of its host, WASI preview 1: a clock, random bytes, and files in memory that are only read.
 
-const OK = 0, BAD = 8, NOT_FOUND = 44, NOT_SUPPORTED = 52, READ_ONLY = 69;
+const OK = 0, BAD = 8, INVALID = 28, NOT_FOUND = 44, NOT_SUPPORTED = 52, READ_ONLY = 69;
 const DIRECTORY = 3, REGULAR = 4;
 const ROOT = 3;
 const ERRORS = 2;
@@ -118,6 +118,11 @@ export class System {
     fd_filestat_get(descriptor, at) {
         const file = this.#open.get(descriptor);
         return file ? this.#state(file.bytes, at) : descriptor === ROOT ? this.#state(null, at) : BAD;
+    }
+
+    // No file is a link: whoever resolves a path asks of each part.
+    path_readlink(_descriptor, path, length) {
+        return this.#find(this.#text(path, length)) === undefined ? NOT_FOUND : INVALID;
     }
 
     path_open(_descriptor, _look, path, length, open, _rights, _inherited, _flags, at) {

@@ -508,7 +508,8 @@ impl View {
     /// yet, the requested picture is rendered again with all layers.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
         let mut wish = self.wish.clone();
-        if shown.is_of_chip() && wish.add_layers() {
+        let is_rendered = wish.settings.picture.layers.iter().any(|layer| shown == Shown::Layer(layer));
+        if shown.is_of_chip() && !is_rendered && wish.add_layers() {
             if self.steering != Some(number) {
                 return Err("this layer is not rendered, and another page steers: take over first".into());
             }

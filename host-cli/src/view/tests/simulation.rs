@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use photoncard_driver::layer::{Layer, Layers};
 use serde_json::{Value, json};
 
 use super::random::Random;
@@ -137,6 +138,21 @@ fn a_reset_keeps_the_layers_that_pages_show() {
         world.settle();
         assert_eq!(world.view.wish().settings.picture.layers.separate_light(), is_of_chip, "{layer}");
     }
+}
+
+#[test]
+fn a_layer_that_is_rendered_is_shown_without_another_picture() {
+    let mut world = World::new();
+    world.connect();
+    let mut wish = world.view.wish().clone();
+    wish.settings.picture.layers = Layers::NONE.with([Layer::Direct]);
+    world.view.wish_for(wish.clone()).unwrap();
+    for (layer, is_rendered) in [("direct", true), ("indirect", false)] {
+        world.send(0, &json!({"type": "layer", "name": layer}));
+        world.settle();
+        assert_eq!(*world.view.wish() == wish, is_rendered, "{layer}");
+    }
+    world.check_pictures();
 }
 
 /// About 4 MiB of unacknowledged tiles are sent, and no more.
