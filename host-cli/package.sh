@@ -15,9 +15,11 @@ formats, by default all:
   deb        a Debian package; it takes dpkg-deb
   wheel      a wheel of Python: program and package
   blender    the extension of Blender with the program
-  npm        a package of npm with the module that the variable PHOTONCARD_MODULE names; without the variable it is left out
+  npm        a package of npm
   container  Containerfile, which builds an image from the archive
   sbom       photoncard-VERSION.cdx.json: the crates in the program, CycloneDX
+The variable PHOTONCARD_MODULE names the module that host-cli/module.sh has built: archive, Debian package and package of npm have it; without the
+variable there is no package of npm.
 EOF
     exit 2
 }
@@ -28,7 +30,7 @@ fail() {
 }
 
 all=(tar deb wheel blender container sbom)
-# What host-cli/module.sh has built, from which the package of npm is made.
+# What host-cli/module.sh has built.
 if [ -n "${PHOTONCARD_MODULE:-}" ]; then
     PHOTONCARD_MODULE=$(realpath "$PHOTONCARD_MODULE")
     export PHOTONCARD_MODULE
@@ -135,6 +137,8 @@ stage_files() {
         "$files/bin/photoncard" completions "$shell" >"$files/completions/photoncard.$shell"
     done
     cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$files"
+    # Where `photoncard page` looks for it.
+    [ -z "${PHOTONCARD_MODULE:-}" ] || install -D -m 644 "$PHOTONCARD_MODULE" "$files/share/photoncard/photoncard.wasm"
     cp -r docs "$files/docs"
     cp scenes/README.md scenes/cornell.gltf "$files/scenes"
     third_party >"$files/LICENSES-OF-CRATES.txt"
@@ -165,6 +169,7 @@ pack_deb() {
     mkdir -p "$root"/{usr/share/zsh/vendor-completions,$documents/scenes}
     install -m 755 "$files/bin/photoncard" "$root/usr/bin"
     install -m 644 "$files"/share/man/man1/* "$root/usr/share/man/man1"
+    [ -z "${PHOTONCARD_MODULE:-}" ] || install -D -m 644 "$files/share/photoncard/photoncard.wasm" "$root/usr/share/photoncard/photoncard.wasm"
     gzip -9n "$root"/usr/share/man/man1/*
     install -m 644 "$files/completions/photoncard.bash" "$root/usr/share/bash-completion/completions/photoncard"
     install -m 644 "$files/completions/photoncard.fish" "$root/usr/share/fish/vendor_completions.d"
