@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 use crate::support::skip;
 
 /// Time limit for the browser's start and for each of its answers.
-const PATIENCE: Duration = Duration::from_secs(200);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(200);
 /// Names of Chromium's program, in order of preference.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
@@ -38,7 +38,7 @@ impl Browser {
             "there is no Chromium; install it (apt-get install chromium), or leave these tests out by setting \
              PHOTONCARD_SKIP_BROWSER to the reason",
         );
-        let address = announced(&mut process);
+        let address = announced(&mut process, "DevTools listening on ");
         let control = Tab::connect(&address);
         let address = address.split("/devtools/").next().unwrap().to_owned();
         Some(Self { process, address, control, _profile: profile })
@@ -83,19 +83,19 @@ fn launch(program: &str, profile: &TempDir) -> Option<Child> {
     command.spawn().ok()
 }
 
-/// Waits for the address of the `DevTools` server, which the browser prints.
-fn announced(process: &mut Child) -> String {
+/// Waits for the address of a browser's server, which it prints after `head`.
+pub(crate) fn announced(process: &mut Child, head: &'static str) -> String {
     let lines = BufReader::new(process.stderr.take().unwrap()).lines();
     let (sender, receiver) = mpsc::channel();
     // The thread reads all that the browser prints: a full pipe would stop the browser.
     std::thread::spawn(move || {
         for line in lines.map_while(Result::ok) {
-            if let Some(address) = line.strip_prefix("DevTools listening on ") {
-                let _ = sender.send(address.to_owned());
+            if let Some(address) = line.strip_prefix(head) {
+                let _ = sender.send(address.trim().to_owned());
             }
         }
     });
-    receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its DevTools")
+    receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its server")
 }
 
 /// Page in a browser, whose scripts can be called.

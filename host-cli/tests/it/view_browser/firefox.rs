@@ -1,20 +1,15 @@
 //! Headless Firefox, driven by `WebDriver BiDi`.
 
-use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
-use std::time::Duration;
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-use super::browser::Scripted;
+use super::browser::{PATIENCE, Scripted, announced};
 use crate::support::skip;
 
-/// Time limit for the browser's start and for each of its answers.
-const PATIENCE: Duration = Duration::from_secs(200);
 /// Names of Firefox's program, in order of preference.
 const PROGRAMS: [&str; 2] = ["firefox", "firefox-esr"];
 
@@ -39,7 +34,7 @@ impl Firefox {
             "there is no Firefox; install it (apt-get install firefox-esr), or leave its test out by setting \
              PHOTONCARD_SKIP_FIREFOX to the reason",
         );
-        let address = announced(&mut process);
+        let address = announced(&mut process, "WebDriver BiDi listening on ");
         let stream = TcpStream::connect(address.trim_start_matches("ws://")).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let (socket, _) = tungstenite::client(format!("{address}/session"), stream).unwrap();
@@ -95,19 +90,4 @@ fn launch(program: &str, profile: &TempDir) -> Option<Child> {
     command.args(["--headless", "--no-remote", "--remote-debugging-port=0", "--profile"]);
     command.arg(profile.path()).env("HOME", profile.path());
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().ok()
-}
-
-/// Waits for the address of the `WebDriver BiDi` server, which the browser prints.
-fn announced(process: &mut Child) -> String {
-    let lines = BufReader::new(process.stderr.take().unwrap()).lines();
-    let (sender, receiver) = mpsc::channel();
-    // The thread reads all that the browser prints: a full pipe would stop the browser.
-    std::thread::spawn(move || {
-        for line in lines.map_while(Result::ok) {
-            if let Some(address) = line.strip_prefix("WebDriver BiDi listening on ") {
-                let _ = sender.send(address.trim().to_owned());
-            }
-        }
-    });
-    receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its WebDriver")
 }
