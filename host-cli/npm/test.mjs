@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { cpSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
@@ -98,22 +98,20 @@ class Browser {
     #id = 0;
     #rest = "";
 
-    static async open(address) {
-        const name = BROWSERS.find(name => process.env.PATH.split(":").some(folder => readdirSafe(folder).includes(name)));
+    async open(address) {
+        const name = BROWSERS.find(name => process.env.PATH.split(":").some(folder => existsSync(join(folder, name))));
         assert(name, "there is no Chromium");
-        const browser = new Browser();
         const profile = join(room, "profile");
-        browser.child = spawn(name, ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe",
+        this.child = spawn(name, ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe",
             `--user-data-dir=${profile}`, "about:blank"], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
-        browser.child.stdio[4].setEncoding("utf8").on("data", data => browser.#hear(data));
-        const { targetId } = await browser.call("Target.createTarget", { url: "about:blank" });
-        const { sessionId } = await browser.call("Target.attachToTarget", { targetId, flatten: true });
-        browser.page = sessionId;
-        await browser.#follow(sessionId);
-        await browser.call("Page.enable", {}, sessionId);
-        await browser.call("Page.navigate", { url: address }, sessionId);
-        await browser.until(() => browser.value("typeof render === 'function'"), "the page does not begin");
-        return browser;
+        this.child.stdio[4].setEncoding("utf8").on("data", data => this.#hear(data));
+        const { targetId } = await this.call("Target.createTarget", { url: "about:blank" });
+        const { sessionId } = await this.call("Target.attachToTarget", { targetId, flatten: true });
+        this.page = sessionId;
+        await this.#follow(sessionId);
+        await this.call("Page.enable", {}, sessionId);
+        await this.call("Page.navigate", { url: address }, sessionId);
+        await this.until(() => this.value("typeof render === 'function'"), "the page does not begin");
     }
 
     call(method, params = {}, sessionId = undefined) {
@@ -164,17 +162,10 @@ class Browser {
     }
 
     async close() {
+        if (!this.child) return;
         const ended = new Promise(resolve => this.child.once("exit", resolve));
         await this.call("Browser.close");
         await ended;
-    }
-}
-
-function readdirSafe(folder) {
-    try {
-        return readdirSync(folder);
-    } catch {
-        return [];
     }
 }
 
@@ -311,16 +302,18 @@ const tests = {
     },
 };
 
+const browser = new Browser();
+let server;
 try {
-    const { server, origin } = await served(build());
-    const browser = await Browser.open(`${origin}/`);
+    const site = await served(build());
+    server = site.server;
+    await browser.open(`${site.origin}/`);
     for (const [name, act] of Object.entries(tests)) {
-        await act(browser, origin);
+        await act(browser, site.origin);
         console.log(`ok: ${name}`);
     }
-    await browser.close();
-    server.close();
 } finally {
-    // A browser that is left ends with its pipes.
+    await browser.close();
+    server?.close();
     rmSync(room, { recursive: true, force: true, maxRetries: 10, retryDelay: 200 });
 }
