@@ -152,7 +152,6 @@ fn a_layer_that_is_rendered_is_shown_without_another_picture() {
         world.settle();
         assert_eq!(*world.view.wish() == wish, is_rendered, "{layer}");
     }
-    world.check_pictures();
 }
 
 /// About 4 MiB of unacknowledged tiles are sent, and no more.
