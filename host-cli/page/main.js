@@ -106,6 +106,8 @@ const view = {
     get size() { return picture.size; },
     get steers() { return steers && camera !== null; },
     move(next, isMoving) {
+        // A drag may end after another scene was asked for.
+        if (!camera) return;
         camera = next;
         isCameraOwn = true;
         toSend = { isMoving };
@@ -415,7 +417,7 @@ on("layer", "change", ({ target }) => {
 });
 on("side", "change", ({ target }) => { asked.side = target.value; fit(); });
 on("camera", "change", ({ target }) => {
-    const chosen = scene.cameras[target.value];
+    const chosen = scene?.cameras[target.value];
     if (target.value === "" || !chosen) return;
     const place = target.value;
     view.move(chosen, false);
