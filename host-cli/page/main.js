@@ -182,7 +182,9 @@ function open(files, words, shown) {
     exposure.take(shown ?? {});
     hush();
     show();
-    connection.open(files, [...words, "--card", `emulated:${cards}`]);
+    // A link may state cards.
+    const own = words.some(word => /^--card(=|$)/.test(word)) ? [] : ["--card", `emulated:${cards}`];
+    connection.open(files, [...words, ...own]);
 }
 
 function take(message) {
