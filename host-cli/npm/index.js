@@ -57,10 +57,11 @@ async function fetched(url, signal) {
 // A path as the module looks for it.
 const plain = path => path.split("/").filter(part => part !== "" && part !== ".").join("/");
 
+// A copy of a file's bytes: they move to the host.
 async function bytesOf(path, content) {
     if (content instanceof Blob) return new Uint8Array(await content.arrayBuffer());
-    if (content instanceof ArrayBuffer) return new Uint8Array(content);
-    if (ArrayBuffer.isView(content)) return new Uint8Array(content.buffer, content.byteOffset, content.byteLength);
+    if (content instanceof ArrayBuffer) return new Uint8Array(content.slice());
+    if (ArrayBuffer.isView(content)) return new Uint8Array(content.buffer, content.byteOffset, content.byteLength).slice();
     throw new TypeError(`${path} is neither a Uint8Array, an ArrayBuffer nor a Blob`);
 }
 

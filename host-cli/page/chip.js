@@ -1,6 +1,6 @@
-// A worker that is a card: the first message has the module and the chip, all others are bytes of the host.
+// A worker that is a card: the first message has the module and the chip, all others are bytes of the host. It sends bytes, and once {lock: name}.
 
-import { Instance } from "./instance.js";
+import { Instance, holdLock } from "./instance.js";
 import { soonCaller } from "./soon.js";
 
 let card = null;
@@ -21,7 +21,7 @@ async function begin({ module, chip }) {
     };
     const instance = await Instance.of(module, new Map(), { send_to_host: send }, () => { });
     instance.giveText(chip);
-    if (instance.exports.open_card() !== 0) throw new Error("the chip is none");
+    if (instance.exports.open_card() !== 0) throw new Error("its chip cannot be read");
     card = instance;
     early.forEach(serve);
     early = null;
@@ -32,3 +32,5 @@ onmessage = ({ data }) => {
     else if (card) serve(data);
     else early.push(data);
 };
+
+holdLock(lock => postMessage({ lock }));

@@ -51,6 +51,16 @@ export class Exposure {
         this.renew();
     }
 
+    // Takes what a link states: {exposure, tonemap}; otherwise exposure is automatic, and the curve stays.
+    take({ exposure, tonemap }) {
+        const { automatic, curve } = this.#inputs;
+        automatic.checked = !Number.isFinite(exposure);
+        if (!automatic.checked) this.#inputs.exposure.value = this.#stops = exposure;
+        if ([...curve.options].some(({ value }) => value === tonemap)) curve.value = tonemap;
+        this.#release();
+        this.renew();
+    }
+
     #release() {
         this.#isHeld = false;
         this.#showHeld();

@@ -15,6 +15,11 @@ export class History {
         this.#at = this.#places.length - 1;
     }
 
+    clear() {
+        this.#places = [];
+        this.#at = -1;
+    }
+
     get canUndo() {
         return this.#at > 0;
     }

@@ -1,9 +1,9 @@
 // The worker that is the host: it holds the scene, traces photons, and deals tiles to the workers that are cards.
 //
 // From the page: {open: {files, arguments}}, {pause: boolean}, a text (a message of the view), bytes (a part of a file). To the page: a text, bytes
-// (a tile or a file), {opened}, {failed: reason}, {said: line}.
+// (a tile or a file), {lock: name}, {opened}, {failed: reason}, {said: line}.
 
-import { Instance } from "./instance.js";
+import { Instance, awaitEnd, holdLock } from "./instance.js";
 import { soonCaller } from "./soon.js";
 
 // Milliseconds until a host that waits looks at its clocks.
@@ -11,10 +11,11 @@ const LOOK = 20;
 
 const compiled = WebAssembly.compileStreaming(fetch(new URL("./photoncard.wasm", import.meta.url)));
 const cards = new Map();
+// The last line that the module has printed: before it ends, it says why.
+let line = "";
 let host = null, isOpen = false, isPaused = false, timer = 0;
 // Where texts of the module go: before the view is open, the reason why it cannot be.
 let told = () => { };
-let queue = Promise.resolve();
 
 const soon = soonCaller(turn);
 
@@ -26,8 +27,14 @@ function turn() {
         if (host.exports.go_on() === 1) soon();
         else timer = setTimeout(turn, LOOK);
     } catch (error) {
-        fail(`the renderer has stopped: ${error.message}`);
+        stop(error);
     }
+}
+
+// A fault of the module. Its own words say more than the browser's, such as that memory is short.
+function stop(error) {
+    const isTrap = error instanceof WebAssembly.RuntimeError && line;
+    fail(`the renderer has stopped: ${isTrap ? line : error.message}`);
 }
 
 function fail(reason) {
@@ -38,6 +45,15 @@ function fail(reason) {
     postMessage({ failed: reason });
 }
 
+function lose(index, worker, reason) {
+    if (cards.get(index) !== worker || !host) return;
+    worker.terminate();
+    cards.delete(index);
+    postMessage({ said: `card ${index + 1} has stopped: ${reason}` });
+    host.exports.lose_card(index);
+    soon();
+}
+
 const functions = {
     start_card(instance, index, at, length) {
         const worker = new Worker(new URL("./chip.js", import.meta.url), { type: "module" });
@@ -45,16 +61,14 @@ const functions = {
         cards.set(index, worker);
         worker.onmessage = ({ data }) => {
             if (cards.get(index) !== worker || !host) return;
+            if (data.lock) return awaitEnd(data.lock, () => lose(index, worker, "its worker was ended"));
             host.give(data);
             host.exports.receive_from_card(index);
             soon();
         };
         worker.onerror = event => {
-            event.preventDefault?.();
-            if (cards.get(index) !== worker || !host) return;
-            postMessage({ said: `card ${index + 1} has stopped: ${event.message ?? "its worker ended"}` });
-            host.exports.lose_card(index);
-            soon();
+            event.preventDefault();
+            lose(index, worker, event.message ?? "its worker cannot start");
         };
         const chip = instance.text(at, length);
         compiled.then(module => worker.postMessage({ module, chip }));
@@ -75,12 +89,12 @@ const functions = {
 };
 
 async function open({ files, arguments: words }) {
-    isOpen = false;
-    for (const worker of cards.values()) worker.terminate();
-    cards.clear();
     let reason = "the scene cannot be shown";
     told = text => reason = text;
-    host = await Instance.of(await compiled, files, functions, line => postMessage({ said: line }));
+    host = await Instance.of(await compiled, files, functions, said => {
+        line = said;
+        postMessage({ said });
+    });
     host.giveText(JSON.stringify(words));
     if (host.exports.open_view() !== 0) return fail(reason);
     told = text => postMessage(text);
@@ -91,7 +105,7 @@ async function open({ files, arguments: words }) {
 
 onmessage = ({ data }) => {
     if (data?.open) {
-        queue = queue.then(() => open(data.open)).catch(error => fail(`the renderer has stopped: ${error.message}`));
+        open(data.open).catch(stop);
     } else if (data?.pause !== undefined) {
         isPaused = data.pause;
         soon();
@@ -106,7 +120,9 @@ onmessage = ({ data }) => {
             }
             soon();
         } catch (error) {
-            fail(`the renderer has stopped: ${error.message}`);
+            stop(error);
         }
     }
 };
+
+holdLock(lock => postMessage({ lock }));

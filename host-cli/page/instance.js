@@ -1,4 +1,4 @@
-// An instance of the module in a worker: its memory, and calls with bytes.
+// An instance of the module in a worker: its memory, calls with bytes, and notice of its end.
 
 import { System } from "./wasi.js";
 
@@ -38,4 +38,19 @@ export class Instance {
     giveText(text) {
         this.give(new TextEncoder().encode(text));
     }
+}
+
+// Holds a lock for as long as this worker lives, and tells its name. A browser that ends a worker, such as when memory is short, tells nobody, but
+// gives the worker's locks free. Browsers have locks on `https:` and `localhost` alone.
+export function holdLock(tell) {
+    const name = `photoncard ${Math.random()}`;
+    navigator.locks?.request(name, () => {
+        tell(name);
+        return new Promise(() => { });
+    });
+}
+
+// Calls a function when the worker that holds a lock has ended.
+export function awaitEnd(name, act) {
+    navigator.locks.request(name, act);
 }

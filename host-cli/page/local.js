@@ -1,5 +1,6 @@
 // The link to a host in a worker of this page.
 
+import { awaitEnd } from "./instance.js";
 import { Link } from "./link.js";
 
 // Its handlers have also `failed(reason)` and `said(line)`.
@@ -7,18 +8,21 @@ export class LocalHost extends Link {
     #worker = null;
     #isOpen = false;
 
-    // Opens the view of a scene: its files, a map from paths to bytes, and the arguments of `photoncard view`.
+    // Opens the view of a scene: its files, a map from paths to bytes, and the arguments of `photoncard view`. The files can be large: they move
+    // to the host, and are not copied.
     open(files, words) {
         this.close();
         this.restart();
-        this.#worker = new Worker(new URL("./host.js", import.meta.url), { type: "module" });
-        this.#worker.onmessage = ({ data }) => this.#hear(data);
-        this.#worker.onerror = event => this.#fail(`the renderer cannot start: ${event.message ?? "its worker has no answer"}`);
-        this.#worker.postMessage({ open: { files, arguments: words } });
+        const worker = new Worker(new URL("./host.js", import.meta.url), { type: "module" });
+        this.#worker = worker;
+        worker.onmessage = ({ data }) => worker === this.#worker && this.#hear(data, worker);
+        worker.onerror = event => worker === this.#worker && this.#fail(`the renderer has stopped: ${event.message ?? "its worker cannot start"}`);
+        worker.postMessage({ open: { files, arguments: words } }, [...files.values()].map(bytes => bytes.buffer));
     }
 
-    #hear(data) {
+    #hear(data, worker) {
         if (typeof data === "string" || data instanceof ArrayBuffer) return this.take(data);
+        if (data.lock) awaitEnd(data.lock, () => worker === this.#worker && this.#fail("the renderer has stopped: its worker was ended, perhaps as memory is short"));
         if (data.said) this.handlers.said(data.said);
         if (data.failed) this.#fail(data.failed);
         if (data.opened) {
@@ -49,6 +53,11 @@ export class LocalHost extends Link {
 
     get isOpen() {
         return this.#isOpen;
+    }
+
+    // Whether there is a view, perhaps one whose scene is still being read.
+    get isRunning() {
+        return this.#worker !== null;
     }
 
     get isBusy() {

@@ -30,7 +30,7 @@ const byId = id => document.getElementById(id);
 // What the page that steers may use alone.
 const STEERED = "#mix, #lights, #materials, #techniques, #camera, #fov, #side, #reset, #denoise, #rotation, #map, #turntable";
 
-// Cards of a page that has its own host: each is a worker with a card memory of its own.
+// Greatest number of cards of a page that has its own host.
 const MAX_CARDS = 16;
 
 // What the layers are for those who look at pictures.
@@ -72,6 +72,7 @@ const overlay = new Overlay(picture, showLayer);
 
 // Shows the status, and the picture in the next frame.
 function show() {
+    document.body.classList.toggle("reading", !scene);
     drawing.soon();
     sending.soon();
     showStatus(isOpen, hasHost, state, png());
@@ -105,6 +106,8 @@ const view = {
     get size() { return picture.size; },
     get steers() { return steers && camera !== null; },
     move(next, isMoving) {
+        // A drag may end after another scene was asked for.
+        if (!camera) return;
         camera = next;
         isCameraOwn = true;
         toSend = { isMoving };
@@ -155,20 +158,34 @@ const surroundings = new Surroundings({
     told: tell,
     takes: files => !start || byId("start").hidden && files.every(isMap),
 });
-const start = hasHost ? new Start(open) : null;
+// Cards of a page that has its own host: each is a worker with a card memory of its own.
+const cards = Math.max(1, Math.min(navigator.hardwareConcurrency ?? 1, MAX_CARDS));
+const start = hasHost ? new Start({ open, hasView: () => connection.isRunning, cards }) : null;
 const saving = new Saving(fields => asked.saveId = send("", { type: "save", ...fields, ...exposure.asked }));
 
 const isPressed = id => byId(id).getAttribute("aria-pressed") === "true";
 const press = (id, value) => byId(id).setAttribute("aria-pressed", value);
 
-// Begins the view of other files, with the arguments of a view.
-function open(files, words) {
-    scene = state = null;
+// Begins the view of other files, with the arguments of a view. What a person has changed of the scene before is not of this one.
+function open(files, words, shown) {
+    turntable.stop();
+    scene = state = camera = toSend = pointed = null;
     isCameraOwn = false;
-    Object.assign(asked, { layer: "radiance", size: null, started: null, camera: "" });
+    Object.assign(asked, { layer: "radiance", size: null, started: null, camera: "", cursor: undefined });
+    asked.edits.clear();
+    asked.mixes.clear();
+    history.clear();
+    controls.centre = null;
+    compare.drop();
+    zoom.fit();
+    picture.clear();
+    exposure.take(shown ?? {});
+    hush();
     show();
-    const cards = Math.max(1, Math.min(navigator.hardwareConcurrency ?? 1, MAX_CARDS));
-    connection.open(files, words.includes("--card") ? words : [...words, "--card", `emulated:${cards}`]);
+    // A link may state cards.
+    const own = words.some(word => /^--card(=|$)/.test(word)) ? [] : ["--card", `emulated:${cards}`];
+    connection.open(files, [...words, ...own]);
+    connection.pause(document.hidden);
 }
 
 function take(message) {
@@ -192,9 +209,10 @@ function take(message) {
 }
 
 function hello(message) {
-    if (scene === null && message.size_stated) asked.side = "";
+    if (scene === null) asked.side = message.size_stated ? "" : asked.side || "512";
     scene = { ...message.scene, isNew: scene?.name !== message.scene.name };
     byId("scene").textContent = document.title = scene.name;
+    show();
     panel.show(scene);
     panel.showGroups(message.light_groups);
     const options = (id, entries) =>
@@ -402,7 +420,7 @@ on("layer", "change", ({ target }) => {
 });
 on("side", "change", ({ target }) => { asked.side = target.value; fit(); });
 on("camera", "change", ({ target }) => {
-    const chosen = scene.cameras[target.value];
+    const chosen = scene?.cameras[target.value];
     if (target.value === "" || !chosen) return;
     const place = target.value;
     view.move(chosen, false);
@@ -439,7 +457,7 @@ on("inspector", "toggle", () => {
 });
 on("workings", "toggle", ({ target }) => byId("times").hidden = !target.open);
 on("copy-command", "click", ({ target }) => copy(byId("command").textContent, target));
-on("copy-link", "click", ({ target }) => state && copy(`${location.href.split("#")[0]}#${encodeURIComponent(state.command)}`, target));
+on("copy-link", "click", ({ target }) => state && copy(`${location.href.split("#")[0]}#${encodeURIComponent(state.command + png())}`, target));
 on("copy-pose", "click", ({ target }) => camera && copy(pose(camera), target));
 on("toggle", "click", ({ target }) => {
     const isShown = byId("panel").hidden;
@@ -495,7 +513,15 @@ if (hasHost) {
     start.show("");
     // A page that nobody sees leaves the processor to others.
     document.addEventListener("visibilitychange", () => connection.pause(document.hidden));
-    navigator.serviceWorker?.register("offline.js").catch(error => console.info(`not offline: ${error.message}`));
+    const keeper = navigator.serviceWorker;
+    const isRenewed = Boolean(keeper?.controller);
+    keeper?.register("offline.js").catch(error => console.info(`not offline: ${error.message}`));
+    // Workers that begin from now on would be of the new version, and this page of the old one.
+    keeper?.addEventListener("controllerchange", () => {
+        if (!isRenewed) return;
+        if (connection.isRunning) tell("There is a newer version of this page: reload it before another scene is opened.");
+        else location.reload();
+    });
 }
 
 // For tests and for whoever looks in the browser's console.

@@ -2,10 +2,13 @@
 
 const NAME = "photoncard-VERSION";
 
+// Names may have signs that have a meaning in an address.
+const addressOf = file => file.split("/").map(encodeURIComponent).join("/");
+
 self.addEventListener("install", event => event.waitUntil((async () => {
     const cache = await caches.open(NAME);
     const files = await (await fetch("files.json", { cache: "no-store" })).json();
-    await cache.addAll(files.map(file => new Request(file, { cache: "no-cache" })));
+    await cache.addAll(files.map(file => new Request(addressOf(file), { cache: "no-cache" })));
     await self.skipWaiting();
 })()));
 

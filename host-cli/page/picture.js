@@ -29,6 +29,13 @@ export class Picture {
         Object.assign(this, { version, step: Infinity, samples: 0, filled: 0, whole: { version: 0, step: Infinity } });
     }
 
+    // A picture of another scene follows.
+    clear() {
+        this.data.fill(0);
+        this.mark(() => [-1, -1]);
+        this.restart(0);
+    }
+
     // Another size. The old picture is stretched over the new one until tiles come.
     resize([width, height]) {
         const [oldWidth, oldHeight] = this.size;

@@ -15,7 +15,7 @@ const progress = {
             : `Getting better: ${state.samples} of ${state.spp} samples a pixel.`,
 };
 
-// A page that has its own host never loses it on the way: it reads a scene, or asks for one.
+// A page that has its own host reads a scene while the host is not open; before that, and when it is lost, the choice of scenes hides the status.
 export function showStatus(isOpen, hasHost, state, more) {
     const name = !isOpen ? hasHost ? "reading" : "lost" : state?.refused ? "refused" : state?.settled ? "settled" : "working";
     byId("status").dataset.state = name;

@@ -6,7 +6,17 @@ const ROOT = 3;
 const ERRORS = 2;
 const ALL_RIGHTS = 0xffffffffffffffffn;
 
-// A system whose files are `files`, a map from paths without a leading slash to bytes; `said(line)` is told what the module prints.
+// Path from the root, without a leading slash: archives and glTF files may have `.`, `..` and, from Windows, backslashes.
+export function plain(path) {
+    const parts = [];
+    for (const part of path.split(/[/\\]/)) {
+        if (part === "..") parts.pop();
+        else if (part !== "" && part !== ".") parts.push(part);
+    }
+    return parts.join("/");
+}
+
+// A system whose files are `files`, a map from plain paths to bytes; `said(line)` is told what the module prints.
 export class System {
     #memory = null;
     #open = new Map();
@@ -42,7 +52,7 @@ export class System {
 
     // The file, or `null` for a folder; undefined if there is none. Paths are below the root.
     #find(path) {
-        const name = path.split("/").filter(part => part !== "" && part !== ".").join("/");
+        const name = plain(path);
         if (this.files.has(name)) return this.files.get(name);
         return name === "" || [...this.files.keys()].some(key => key.startsWith(`${name}/`)) ? null : undefined;
     }
@@ -115,14 +125,14 @@ export class System {
         return file === undefined ? NOT_FOUND : this.#state(file, at);
     }
 
+    // Nothing is a link: who asks for a whole path, such as for files that a scene names, learns it by this error.
+    path_readlink(_descriptor, path, length) {
+        return this.#find(this.#text(path, length)) === undefined ? NOT_FOUND : INVALID;
+    }
+
     fd_filestat_get(descriptor, at) {
         const file = this.#open.get(descriptor);
         return file ? this.#state(file.bytes, at) : descriptor === ROOT ? this.#state(null, at) : BAD;
-    }
-
-    // No file is a link: whoever resolves a path asks of each part.
-    path_readlink(_descriptor, path, length) {
-        return this.#find(this.#text(path, length)) === undefined ? NOT_FOUND : INVALID;
     }
 
     path_open(_descriptor, _look, path, length, open, _rights, _inherited, _flags, at) {

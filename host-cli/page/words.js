@@ -21,10 +21,16 @@ export function wordsOf(line) {
     return word === null ? words : [...words, word];
 }
 
-// The scene and the options of a view in the command line of a render; null if it is none.
+// The scene and the options of a view in the command line of a render, and how its PNG is shown; null if it is none.
 export function viewOf(line) {
     const [program, command, scene, ...rest] = wordsOf(line);
     if (program !== "photoncard" || command !== "render" || !scene) return null;
-    const options = rest.filter((word, index) => word !== "-o" && rest[index - 1] !== "-o");
-    return { scene, options };
+    const view = { scene, options: [] };
+    for (let at = 0; at < rest.length; at++) {
+        if (rest[at] === "-o") at++;
+        else if (rest[at] === "--exposure") view.exposure = Number(rest[++at]);
+        else if (rest[at] === "--tonemap") view.tonemap = rest[++at];
+        else view.options.push(rest[at]);
+    }
+    return view;
 }
