@@ -63,7 +63,8 @@ fn files(module: Vec<u8>, scenes: Vec<File>) -> Vec<File> {
     }
     let names = files.iter().map(|(name, _)| name.as_str()).filter(|name| *name != "offline.js");
     let names: Vec<&str> = ["./"].into_iter().chain(names).collect();
-    files.push((LIST.into(), json!(names).to_string().into_bytes()));
+    // The list is written first: by it the next run knows the folder again, also if this one is interrupted.
+    files.insert(0, (LIST.into(), json!(names).to_string().into_bytes()));
     files
 }
 
@@ -123,8 +124,10 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<File>, Failure> {
 fn scene(path: &Path) -> Result<File, Failure> {
     let bytes = read(path)?;
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let is_whole = bytes.starts_with(b"glTF") || !names_files(&bytes);
-    if !is_whole {
+    let Some(gltf) = json_of(&bytes) else {
+        return Err(refused(format!("{} is no glTF file", path.display()), "state a file .glb or .gltf"));
+    };
+    if names_files(&gltf) {
         return Err(refused(
             format!("{} names other files", path.display()),
             "convert it to one file .glb, such as by: npx gltf-pipeline -i scene.gltf -o scene.glb",
@@ -133,9 +136,20 @@ fn scene(path: &Path) -> Result<File, Failure> {
     Ok((format!("scenes/{name}"), bytes))
 }
 
+/// JSON of a glTF file. That of a GLB is its first chunk, behind twenty bytes of heads.
+fn json_of(bytes: &[u8]) -> Option<Value> {
+    let text = match bytes.strip_prefix(b"glTF") {
+        None => bytes,
+        Some(rest) => {
+            let length = u32::from_le_bytes(rest.get(8..12)?.try_into().ok()?);
+            rest.get(16..)?.get(..length as usize)?
+        }
+    };
+    serde_json::from_slice(text).ok()
+}
+
 /// Returns whether the JSON of a glTF file names other files: a URI that has no data itself.
-fn names_files(text: &[u8]) -> bool {
-    let Ok(gltf) = serde_json::from_slice::<Value>(text) else { return false };
+fn names_files(gltf: &Value) -> bool {
     let of = |list: &str| gltf[list].as_array().cloned().unwrap_or_default();
     of("buffers")
         .iter()

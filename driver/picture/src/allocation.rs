@@ -29,8 +29,11 @@ pub fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> {
 }
 
 /// Remedy to suggest when the system refuses memory.
-pub const REMEDY: &str =
-    "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
+pub const REMEDY: &str = if cfg!(target_family = "wasm") {
+    "a page has at most 4 GiB: open the scene with the program `photoncard`"
+} else {
+    "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory"
+};
 
 /// Checks that the process can allocate `bytes` at once. The allocation is freed again.
 ///

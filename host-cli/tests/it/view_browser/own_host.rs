@@ -157,6 +157,15 @@ fn a_folder_with_other_files_is_not_written() {
     room.write("module.wasm", b"\0asm");
     let outcome = room.run(&["page", "site", "--module", "module.wasm"]);
     assert!(outcome.stderr.contains("has other files"), "{}", outcome.stderr);
+    for (name, bytes, expected) in [
+        ("a.glb", &b"no scene"[..], "is no glTF file"),
+        ("a.gltf", br#"{"buffers":[{"uri":"a.bin"}]}"#, "names other files"),
+        ("b.glb", b"glTF\x02\0\0\0\xff\0\0\0\xff\0\0\0JSON{}", "is no glTF file"),
+    ] {
+        room.write(name, bytes);
+        let outcome = room.run(&["page", "new", "--module", "module.wasm", "--scene", name]);
+        assert!(outcome.status == Some(2) && outcome.stderr.contains(expected), "{name}: {}", outcome.stderr);
+    }
     assert!(room.run(&["page", "new", "--module", "module.wasm"]).status == Some(0));
     assert!(Path::new(&room.path("new/index.html")).is_file());
 }
