@@ -13,7 +13,7 @@ use photoncard_driver::film::Film;
 use photoncard_driver::output;
 use photoncard_driver::render::{NamedSettings, Rendering, turn};
 use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::canvas::Gains;
 use super::pages::{Outgoing, file_message};
@@ -30,11 +30,19 @@ use crate::picture_files::{Form, picture_bytes};
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
-    /// Denoised radiance, if the view denoises.
-    pub(super) denoised: Option<Vec<[f32; 3]>>,
+    /// The denoised picture, if the view denoises.
+    pub(super) denoised: Option<Denoised>,
     pub(super) wish: Wish,
     /// Provenance of the pixels, with the names of the input files.
     pub(super) provenance: NamedSettings,
+}
+
+/// A denoised picture.
+#[derive(Clone)]
+pub(super) struct Denoised {
+    pub(super) radiance: Vec<[f32; 3]>,
+    /// Entry of the provenance for the denoiser.
+    pub(super) by: (String, Value),
 }
 
 /// Work of the painter.
@@ -202,14 +210,15 @@ impl Hub {
             Some(settled) => {
                 let Settled { rendering, denoised, wish, provenance, .. } = &*settled;
                 let identities = rendering.identities.clone();
-                let denoised = denoised.clone().filter(|_| look.is_denoised);
+                let mut provenance = provenance.clone();
+                let denoised =
+                    denoised.clone().filter(|_| look.is_denoised).map(|Denoised { radiance, by }| {
+                        provenance.extend([by]);
+                        radiance
+                    });
                 let film = &rendering.film;
-                self.put(
-                    saving,
-                    &saving.name,
-                    &Subject { film, identities, denoised, wish, provenance },
-                    &look,
-                )
+                let subject = Subject { film, identities, denoised, wish, provenance: &provenance };
+                self.put(saving, &saving.name, &subject, &look)
             }
             None => {
                 let unsettled =

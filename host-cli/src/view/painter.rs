@@ -16,7 +16,7 @@ use photoncard_shared::message::Tile;
 use super::canvas::Origin;
 use super::describe::SceneFacts;
 use super::fitting::{Fitting, find};
-use super::hub::{Hub, Job, Settled};
+use super::hub::{Denoised, Hub, Job, Settled};
 use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
 use super::wish::Sketch;
@@ -177,7 +177,9 @@ impl Painter {
             let mut provenance = statistics.provenance.pixels.clone();
             let assignments = task.wish.assignments();
             provenance.extend(input::provenance(&SceneOptions { assignments, ..self.options.clone() }));
-            provenance.extend(self.denoiser.filter(|_| denoised.is_some()).map(denoised_by));
+            let denoised = denoised
+                .zip(self.denoiser)
+                .map(|(radiance, denoiser)| Denoised { radiance, by: denoised_by(denoiser) });
             let wish = task.wish.clone();
             self.hub.keep(Settled { version: task.work.version, rendering, denoised, wish, provenance });
         }
