@@ -1,7 +1,7 @@
 //! photoncard in a browser: one WebAssembly module, which is a view's host in one worker and a card in each
 //! of others.
 //!
-//! The module is called by `page/host.js` and `page/chip.js`. Bytes come in the buffer that [`buffer`] gives;
+//! The module is called by `page/host.js` and `page/chip.js`. Bytes come in the buffer that `buffer` gives;
 //! they leave by the imported functions. Files and the clock are those of WASI (`page/wasi.js`).
 #![cfg(target_family = "wasm")]
 #![expect(unsafe_code, reason = "functions that a page calls, and that it offers")]
