@@ -89,7 +89,7 @@ async function browse(command) {
     const found = { first: first / 1000, settled: settled / 1000, cpu: cpu(chromium.pid) - before, command: await value("document.getElementById('command').textContent") };
     chromium.kill();
     await new Promise(act => chromium.once("exit", act));
-    rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+    rmSync(profile, { recursive: true, force: true, maxRetries: 50 });
     return found;
 }
 
