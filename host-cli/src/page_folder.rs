@@ -23,11 +23,12 @@ const LIST: &str = "files.json";
 const MAGIC: &[u8] = b"\0asm";
 /// Line of `index.html` that says where the host is.
 const COMMANDS_HOST: &str = "<meta name=\"host\" content=\"command\">";
-/// What replaces it. Nothing is loaded from elsewhere, and no script runs but the folder's own.
+/// Content policy, place of the host and manifest, in the line's place. Nothing is loaded from elsewhere, and
+/// no script runs but the folder's own.
 const OWN_HOST: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; \
     worker-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; manifest-src 'self'; base-uri 'none'; form-action 'none'\">\n\
     <meta name=\"host\" content=\"page\">\n<link rel=\"manifest\" href=\"manifest.webmanifest\">";
-/// What the service worker has in place of the version.
+/// Placeholder of the version in the service worker.
 const VERSION: &str = "VERSION";
 
 /// Name of a file in the folder, and its contents.

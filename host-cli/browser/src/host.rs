@@ -23,13 +23,11 @@ thread_local! {
     static VIEW: RefCell<Option<PageView>> = const { RefCell::new(None) };
 }
 
-/// Opens a view. The buffer has the arguments of `photoncard view` as a JSON array of strings. Returns 0, or
-/// 1 if the view cannot begin: then the reason is told as a text.
+/// Opens the instance's one view. The buffer has the arguments of `photoncard view` as a JSON array of
+/// strings. Returns 0, or 1 if the view cannot begin: then the reason is told as a text.
 #[unsafe(no_mangle)]
 extern "C" fn open_view() -> u32 {
     let arguments: Vec<String> = serde_json::from_str(&received_text()).unwrap_or_default();
-    // The cards of the view before end first.
-    VIEW.take();
     match PageView::open(arguments, Arc::new(PageWorkers)) {
         Ok(view) => {
             VIEW.set(Some(view));

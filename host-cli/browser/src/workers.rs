@@ -1,6 +1,6 @@
 //! Links to the cards in other workers: queues of bytes, which the page moves.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::io;
 use std::time::Duration;
@@ -19,7 +19,7 @@ unsafe extern "C" {
     safe fn end_card(index: usize);
 }
 
-/// What has arrived from a card.
+/// Bytes that have arrived from a card, and its state.
 #[derive(Default)]
 struct Inbox {
     bytes: VecDeque<u8>,
@@ -29,7 +29,7 @@ struct Inbox {
 thread_local! {
     static INBOXES: RefCell<Vec<Inbox>> = const { RefCell::new(Vec::new()) };
     /// True if bytes were moved since the last call of [`have_moved`].
-    static HAVE_MOVED: RefCell<bool> = const { RefCell::new(false) };
+    static HAVE_MOVED: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Changes the inbox of a card.

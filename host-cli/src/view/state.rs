@@ -119,7 +119,7 @@ pub(super) struct View {
     pub(super) cost: Cost,
     /// Gains of the light groups in the radiance that pages show; 1 for the picture as it is rendered.
     gains: Gains,
-    /// Whether the final picture is denoised; `None` for a view without a denoiser.
+    /// State of the page's switch of the denoiser; `None` for a view without a denoiser.
     denoises: Option<bool>,
     /// Number of the first request that has the present size of the picture.
     of_size: u32,

@@ -283,7 +283,7 @@ fn an_environment_map_is_dropped_on_the_page() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// What fingers press is large enough for them, and the tools fit a phone.
+/// Buttons are large enough for fingers, and the tools fit a phone.
 #[test]
 fn a_phone_has_targets_for_fingers() {
     let Some(mut browser) = Browser::start() else { return };
