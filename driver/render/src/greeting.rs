@@ -105,19 +105,42 @@ pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
     card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
 }
 
-fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
+pub(super) fn greet_alone(
+    address: &CardAddress,
+    card: OpenCard,
+    start: Instant,
+) -> Result<GreetedCard, RenderError> {
     let greeted = completed(greet(card, &Hands::Threads, start, &Unobserved));
     greeted.map_err(|error| error.of_card(address.name_of(0)))
 }
 
-/// Sends the greeting and waits for the reply.
+/// Time for which a card that closes its link before the reply is greeted again. A board that serves one host
+/// refuses the next until it has noticed that the last one is gone.
+const TURN: Duration = Duration::from_secs(2);
+
+/// Pause before such a card is reached again.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// Sends the greeting and waits for the reply. A remote card that closes the link is reached again for
+/// [`TURN`].
 pub(super) async fn greet(
     mut card: OpenCard,
     hands: &Hands,
     start: Instant,
     observer: &dyn Observer,
 ) -> Result<GreetedCard, GreetingError> {
-    let (session, budget) = greet_port(&mut card, hands, start, observer).await?;
+    let end = Instant::now() + TURN;
+    let (session, budget) = loop {
+        match greet_port(&mut card, hands, start, observer).await {
+            Err(GreetingError::Card(CardError::Refused)) if Instant::now() < end => {
+                std::thread::sleep(PAUSE);
+                if !card.reach_again() {
+                    return Err(CardError::Refused.into());
+                }
+            }
+            greeted => break greeted?,
+        }
+    };
     Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
 }
 

@@ -95,6 +95,15 @@ impl OpenCard {
         }
     }
 
+    /// Closes the link to a remote card and opens it again. Returns whether it is open; `false` for an emulated
+    /// card.
+    pub(super) fn reach_again(&mut self) -> bool {
+        let reached = self.close().and_then(|address| reach(&address).ok());
+        let is_open = reached.is_some();
+        reached.into_iter().for_each(|port| self.go_on_with(port));
+        is_open
+    }
+
     /// Takes the handle through which an emulated card with empty memory can get a card image by reference.
     /// Returns `None` from the second call on, for a modelled memory, and for a remote card.
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {

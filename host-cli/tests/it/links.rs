@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::Stdio;
 
 use crate::support::{Emulator, Outcome, Room, shipped, small_render};
@@ -228,6 +228,37 @@ fn listeners_that_are_no_card_are_reported() {
     let outcome = room.run(&["card", "info", "--card", &address]);
     check_failed(&room, &outcome, &[&address, "closed the link before it said hello"], &[]);
     closing.join().unwrap();
+}
+
+/// Address at which the first connection is closed at once, and the second is one to the card at `address`.
+fn busy_at_first(address: &str) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let busy = format!("tcp:{}", listener.local_addr().unwrap());
+    let card = address.strip_prefix("tcp:").unwrap().to_owned();
+    std::thread::spawn(move || {
+        drop(listener.accept().unwrap());
+        let (host, _) = listener.accept().unwrap();
+        let card = TcpStream::connect(card).unwrap();
+        let [mut from, mut to] = [&host, &card].map(|end| end.try_clone().unwrap());
+        let back = std::thread::spawn(move || std::io::copy(&mut &card, &mut &host));
+        let _ = std::io::copy(&mut from, &mut to);
+        let _ = to.shutdown(Shutdown::Both);
+        let _ = back.join();
+    });
+    busy
+}
+
+#[test]
+fn a_card_that_has_not_noticed_that_its_last_host_is_gone_is_reached_again() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let card = Emulator::start(&room, "tcp:127.0.0.1:0", &[]);
+    for command in ["info", "selftest"] {
+        let outcome = room.run(&["card", command, "--card", &busy_at_first(&card.address)]);
+        assert_eq!(outcome.status, Some(0), "{command}: {}", outcome.stderr);
+    }
+    let options = ["-o", "a.exr", "--size", "32x32", "--photons", "1000", "--quiet"];
+    room.rendered(&cornell, &[&options[..], &["--card", &busy_at_first(&card.address)]].concat());
 }
 
 #[test]

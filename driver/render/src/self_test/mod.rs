@@ -13,7 +13,7 @@ use photoncard_shared::link::Port;
 pub use self::arithmetic::{ArithmeticTest, WrongResult, WrongResults};
 use self::bench::Bench;
 pub use self::memory::PatternTest;
-use super::greeting::{GreetingError, greet_port, open};
+use super::greeting::{GreetedCard, GreetingError, greet_alone, greet_port, open};
 use super::hands::{Hands, completed};
 use super::{CardAddress, Observer, RenderError};
 
@@ -57,7 +57,8 @@ impl SelfTest {
 /// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the
 /// test.
 pub fn card_self_test(address: &CardAddress, observer: &dyn Observer) -> Result<SelfTest, RenderError> {
-    self_test_on(&mut open(address)?, &address.name_of(0), observer)
+    let GreetedCard { mut card, .. } = greet_alone(address, open(address)?, Instant::now())?;
+    self_test_on(&mut card, &address.name_of(0), observer)
 }
 
 /// Tests the card at the other end of a port, like [`card_self_test`]. `card` is the card's name in errors.
