@@ -11,6 +11,7 @@
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
 //! | `memory` | free memory of the machine |
+//! | `web_module` | WebAssembly module that browsers run |
 //! | `notices` | contents of a scene that are ignored, missing or interpreted in another way |
 //! | `shell` | quoting of commands |
 //! | `outputs`, `picture_files` | checks of output files before any work; pictures as files |
@@ -64,6 +65,8 @@ mod shell;
 #[cfg(feature = "study")]
 mod study;
 mod view;
+#[cfg(not(target_family = "wasm"))]
+mod web_module;
 
 #[cfg(not(target_family = "wasm"))]
 use std::process::ExitCode;

@@ -12,15 +12,12 @@ use crate::arguments::PageOptions;
 use crate::console::print;
 use crate::failure::Failure;
 use crate::view::page_files::pages;
+use crate::web_module;
 
 /// Name of the module in the folder.
 const MODULE: &str = "photoncard.wasm";
-/// Place of the module in a package, from the folder of the program.
-const PACKED: &str = "../share/photoncard/photoncard.wasm";
 /// List of the files that a page keeps for use without a network.
 const LIST: &str = "files.json";
-/// First bytes of a WebAssembly module.
-const MAGIC: &[u8] = b"\0asm";
 /// Line of `index.html` that says where the host is.
 const COMMANDS_HOST: &str = "<meta name=\"host\" content=\"command\">";
 /// Content policy, place of the host and manifest, in the line's place. Nothing is loaded from elsewhere, and
@@ -36,7 +33,7 @@ type File = (String, Vec<u8>);
 
 /// Writes the folder of a page.
 pub(crate) fn run(options: &PageOptions) -> Result<(), Failure> {
-    let module = module(options.module.as_deref())?;
+    let module = web_module::read(options.module.as_deref())?;
     let scenes = scenes(&options.scenes)?;
     let folder = &options.folder;
     check_folder(folder)?;
@@ -77,26 +74,6 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
         return Err(refused(format!("{} has other files", folder.display()), "state a new or empty folder"));
     }
     Ok(())
-}
-
-/// Reads the module: the stated one, or that of this program's package.
-fn module(stated: Option<&Path>) -> Result<Vec<u8>, Failure> {
-    let packed = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join(PACKED)));
-    let packed = packed.filter(|path| stated.is_none() && path.is_file());
-    let Some(path) = stated.or(packed.as_deref()) else {
-        return Err(refused(
-            "the module of a page is not beside this program".to_owned(),
-            "build it by host-cli/module.sh FILE, and state it: --module FILE",
-        ));
-    };
-    let bytes = read(path)?;
-    if !bytes.starts_with(MAGIC) {
-        return Err(refused(
-            format!("{} is no WebAssembly module", path.display()),
-            "build it by host-cli/module.sh FILE",
-        ));
-    }
-    Ok(bytes)
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {

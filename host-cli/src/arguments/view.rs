@@ -31,6 +31,20 @@ pub(crate) struct ViewOptions {
     /// End the view when its standard input ends, such as that of a program that has started it
     #[arg(long, help_heading = "Page", hide_short_help = true)]
     pub(crate) attached: bool,
+    /// Let browsers lend their cores as cards: the command prints a second address, of a page that does so in
+    /// any browser that reaches this machine (--listen)
+    #[arg(long, help_heading = "Page")]
+    pub(crate) browser_cards: bool,
+    /// WebAssembly module of the cards of browsers, by host-cli/module.sh [default: that of the program's
+    /// package]
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "browser_cards",
+        help_heading = "Page",
+        hide_short_help = true
+    )]
+    pub(crate) module: Option<PathBuf>,
     /// Folder in which the page may save pictures; without this option it downloads them
     #[arg(long, value_name = "DIR", help_heading = "Page")]
     pub(crate) out: Option<PathBuf>,

@@ -53,6 +53,23 @@ impl CardBoard {
         Self { cards: set.names().into_iter().zip(addresses).map(card).collect() }
     }
 
+    /// Takes another set of cards. Those that stay keep their states.
+    pub(super) fn replace(&mut self, set: &CardSet) {
+        let before = std::mem::replace(self, Self::new(set)).cards;
+        for card in &mut self.cards {
+            let is_same = |other: &Card| match &card.address {
+                Some(address) => other.address.as_ref() == Some(address),
+                None => other.name == card.name,
+            };
+            if let Some(other) = before.iter().find(|other| is_same(other)) {
+                let Card { standing, tiles, try_at, pause, .. } = *other;
+                let error = other.error.clone();
+                (card.standing, card.tiles, card.error) = (standing, tiles, error);
+                (card.try_at, card.pause) = (try_at, pause);
+            }
+        }
+    }
+
     fn of_name(&mut self, name: &str) -> Option<(usize, &mut Card)> {
         self.cards.iter_mut().enumerate().find(|(_, card)| card.name == name)
     }

@@ -13,14 +13,16 @@ use photoncard_driver::render::{Renderer, card_ping, completed};
 
 use super::gate::Gate;
 use super::hub::Hub;
+use super::lending::Lending;
 use super::opening::Opening;
 use super::painter::Painter;
-use super::server;
+use super::server::Server;
 use crate::arguments::ViewOptions;
 use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 use crate::render::on_threads;
+use crate::web_module;
 
 /// Interval of checks whether the view is over.
 const ATTENTION: Duration = Duration::from_millis(50);
@@ -37,13 +39,14 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     }
     let listener = listen(options.listen)?;
     let address = listener.local_addr().map_err(|error| Failure::work_error(&error))?;
+    let lending = options.browser_cards.then(|| lending(options)).transpose()?;
     let Opening { view, folder, denoiser, scene, dram_bytes } = Opening::new(options)?;
     let hub = Arc::new(Hub::new(view, folder, is_over));
-    let gate = Arc::new(Gate::new(address, token()?));
+    let gate = Gate::new(address, token()?, lending.is_some());
     announce(options, address, &gate)?;
-    let (served, gate) = (hub.clone(), gate.clone());
+    let server = Arc::new(Server::new(gate, hub.clone(), lending));
     // Threads of connections are not joined: they end with the process.
-    std::thread::spawn(move || server::serve(&listener, &gate, &served));
+    std::thread::spawn(move || server.serve(&listener));
     std::thread::scope(|scope| {
         scope.spawn(|| look_for_cards(&hub));
         let painter = Painter::new(hub.clone(), (scene, dram_bytes), options, denoiser, Renderer::default());
@@ -56,6 +59,18 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     })?;
     hub.finish_saving();
     Err(Failure::Stopped("stopped; the view is over"))
+}
+
+/// Prepares what browsers need to lend cards: the module, and a chip as that of the first emulated card.
+fn lending(options: &ViewOptions) -> Result<Lending, Failure> {
+    let settings = options.settings();
+    if settings.modelled_caches().is_some() {
+        let text =
+            "cards of browsers have no model of memory: leave out --cache and --counters, or --browser-cards";
+        return Err(Failure::Input(Report::new(MietteDiagnostic::new(text))));
+    }
+    let module = web_module::read(options.module.as_deref())?;
+    Lending::new(module, &settings.cards.emulated_chip()).map_err(|error| Failure::work_error(&error))
 }
 
 fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
@@ -101,7 +116,8 @@ fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(
             }
         ));
     }
-    print(&[gate.url()])?;
+    let urls: Vec<String> = [gate.url()].into_iter().chain(gate.lenders_url()).collect();
+    print(&urls)?;
     if options.open
         && let Err(error) = open_in_browser(&gate.url())
     {

@@ -16,38 +16,59 @@ const PAGE: &str = "/";
 const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
+/// Path of the page that lends cards.
+const LENDER: &str = "/lend.html";
+/// Path of the WebSocket of a lent card.
+const CARD: &str = "/card";
+/// Path of the module that a lent card runs.
+const MODULE: &str = "/photoncard.wasm";
 
 /// Resource that an accepted request receives.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
     /// File of the page.
     File(&'static PageFile),
-    /// WebSocket, with the request's `Sec-WebSocket-Key`.
+    /// WebSocket of a page, with the request's `Sec-WebSocket-Key`.
     Socket(String),
+    /// WebSocket of a lent card, with that key.
+    Card(String),
+    /// WebAssembly module with the card.
+    Module,
 }
 
 /// Access control of a server.
 pub(super) struct Gate {
     address: SocketAddr,
     token: String,
+    /// True if browsers may lend cards.
+    has_lenders: bool,
 }
 
 impl Gate {
     /// Creates the access control of a server that listens at `address`, whose port is not 0.
-    pub(super) fn new(address: SocketAddr, token: String) -> Self {
-        Self { address, token }
+    pub(super) fn new(address: SocketAddr, token: String, has_lenders: bool) -> Self {
+        Self { address, token, has_lenders }
     }
 
     /// URL of the page on this machine, with the token.
     pub(super) fn url(&self) -> String {
-        let Self { address, token } = self;
+        self.url_of(PAGE)
+    }
+
+    /// URL of the page that lends cards, with the token; `None` if browsers may lend none.
+    pub(super) fn lenders_url(&self) -> Option<String> {
+        self.has_lenders.then(|| self.url_of(LENDER))
+    }
+
+    fn url_of(&self, path: &str) -> String {
+        let Self { address, token, .. } = self;
         let ip = match address.ip() {
             IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
             IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
             ip => ip,
         };
         let here = SocketAddr::new(ip, address.port());
-        format!("http://{here}{PAGE}?token={token}")
+        format!("http://{here}{path}?token={token}")
     }
 
     /// Checks a request, and returns the resource that it asks for.
@@ -72,13 +93,22 @@ impl Gate {
                 self.check_token(query)?;
                 page_file("index.html").map(Resource::File)
             }
-            SOCKET => {
+            SOCKET | CARD => {
                 self.check_token(query)?;
                 if origins.is_empty() {
                     return Err(Refusal::forbidden("the request states no origin"));
                 }
-                head.socket_key().map(Resource::Socket)
+                let key = head.socket_key();
+                match path {
+                    SOCKET => key.map(Resource::Socket),
+                    _ => key.filter(|_| self.has_lenders).map(Resource::Card),
+                }
             }
+            LENDER => {
+                self.check_token(query)?;
+                page_file("lend.html").filter(|_| self.has_lenders).map(Resource::File)
+            }
+            MODULE => self.has_lenders.then_some(Resource::Module),
             // Files of the page need no token: they hold nothing of the scene.
             _ => page_file(&path[1.min(path.len())..]).map(Resource::File),
         }
@@ -124,15 +154,15 @@ mod tests {
     const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
     fn gate(address: &str) -> Gate {
-        Gate::new(address.parse().unwrap(), TOKEN.into())
+        Gate::new(address.parse().unwrap(), TOKEN.into(), false)
     }
 
     /// HTTP status of a request; 101 for a WebSocket.
     fn status(gate: &Gate, target: &str, headers: &str) -> u16 {
         let text = format!("GET {target} HTTP/1.1\r\n{headers}\r\n");
         match Head::parse(text.as_bytes()).map(|head| gate.check(&head.unwrap())) {
-            Ok(Ok(Resource::File(_))) => 200,
-            Ok(Ok(Resource::Socket(_))) => 101,
+            Ok(Ok(Resource::File(_) | Resource::Module)) => 200,
+            Ok(Ok(Resource::Socket(_) | Resource::Card(_))) => 101,
             Ok(Err(refusal)) | Err(refusal) => refusal.status,
         }
     }
@@ -199,6 +229,31 @@ mod tests {
         ] {
             assert_eq!(status(&gate, target, &headers), expected, "{target} {headers}");
         }
+    }
+
+    #[test]
+    fn cards_are_lent_with_the_token_where_they_are_asked_for() {
+        let [without, with] = [false, true]
+            .map(|has_lenders| Gate::new("127.0.0.1:8080".parse().unwrap(), TOKEN.into(), has_lenders));
+        let page = format!("http://127.0.0.1:8080/lend.html?token={TOKEN}");
+        assert_eq!((without.lenders_url(), with.lenders_url()), (None, Some(page)));
+        let host = "Host: 127.0.0.1:8080\r\nOrigin: http://127.0.0.1:8080\r\n";
+        let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+                       Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+        for (path, more, expected) in [
+            ("/lend.html", "", 200),
+            ("/card", upgrade, 101),
+            ("/card", "", 404),
+            ("/photoncard.wasm", "", 200),
+        ] {
+            let (target, headers) = (format!("{path}?token={TOKEN}"), format!("{host}{more}"));
+            assert_eq!(status(&with, &target, &headers), expected, "{path}");
+            assert_eq!(status(&without, &target, &headers), 404, "{path}");
+            let is_open = path == "/photoncard.wasm";
+            assert_eq!(status(&with, path, &headers), if is_open { 200 } else { 403 }, "{path}");
+        }
+        let foreign = host.replace("//127", "//evil.example:");
+        assert_eq!(status(&with, &format!("/card?token={TOKEN}"), &format!("{foreign}{upgrade}")), 403);
     }
 
     #[test]

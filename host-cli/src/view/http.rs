@@ -122,14 +122,19 @@ impl Head {
 }
 
 /// Sends a file of the page. The response allows the page to open a WebSocket to `host`, the request's
-/// `Host`.
+/// `Host`, and to run the WebAssembly of this server.
 pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
     // Not all browsers let `'self'` stand for the server's WebSocket.
     let policy = format!(
-        "Content-Security-Policy: default-src 'self'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"
+        "Content-Security-Policy: default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws://{host}; \
+         img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"
     );
     respond(stream, "200 OK", file.kind, &policy, file.text.as_bytes())
+}
+
+/// Sends the WebAssembly module.
+pub(super) fn send_module(stream: &mut TcpStream, module: &[u8]) -> std::io::Result<()> {
+    respond(stream, "200 OK", "application/wasm", "", module)
 }
 
 /// Accepts a WebSocket request.

@@ -10,6 +10,7 @@
 //! - `hub`, `painter`, `fitting`: the state under a lock; the thread that renders, and that of pilot renders.
 //! - `http`, `gate`, `page_files`, `socket`, `server`: requests, access control, the page's files,
 //!   web sockets.
+//! - `lending`: cards that browsers lend.
 //! - `saving`: pictures that a page saves.
 //! - `opening`, `command`, `browser`: beginning of a view; the command; the view whose host is in the page.
 
@@ -26,6 +27,8 @@ mod gate;
 #[cfg(not(target_family = "wasm"))]
 mod http;
 mod hub;
+#[cfg(not(target_family = "wasm"))]
+mod lending;
 mod opening;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) mod page_files;

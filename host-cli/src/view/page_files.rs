@@ -23,6 +23,7 @@ macro_rules! files {
 
 static FILES: &[PageFile] = &files![
     HTML "index.html",
+    HTML "lend.html",
     STYLE "view.css",
     DRAWING "icon.svg",
     MANIFEST "manifest.webmanifest",
@@ -40,6 +41,7 @@ static FILES: &[PageFile] = &files![
     SCRIPT "host.js",
     SCRIPT "inspector.js",
     SCRIPT "instance.js",
+    SCRIPT "lend.js",
     SCRIPT "link.js",
     SCRIPT "local.js",
     SCRIPT "main.js",
@@ -62,9 +64,11 @@ static FILES: &[PageFile] = &files![
     SCRIPT "zoom.js",
 ];
 
-/// Names and texts of all files.
+/// Names and texts of the files of a page without the command.
 pub(crate) fn pages() -> impl Iterator<Item = (&'static str, &'static str)> {
-    FILES.iter().map(|file| (file.name, file.text))
+    // Cards are lent to a command.
+    let files = FILES.iter().filter(|file| !file.name.starts_with("lend."));
+    files.map(|file| (file.name, file.text))
 }
 
 /// Embedded file with this name; `None` if there is none.

@@ -214,6 +214,8 @@ impl Painter {
                 settings.integrator.samples = samples;
                 settings.integrator.planned_samples = Some(asked.planned());
                 settings.schedule.keep_records = asked.samples > 1;
+                // Browsers may lend cards between passes.
+                settings.cards = self.hub.change(|view, _| view.with_lent_cards(&settings.cards));
             })
         };
         let mut samples = 1;

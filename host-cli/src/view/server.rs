@@ -12,32 +12,83 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::gate::{Gate, Resource};
-use super::http::{Head, Refusal, accept_socket, send_file};
+use super::http::{Head, Refusal, accept_socket, send_file, send_module};
 use super::hub::Hub;
+use super::lending::Lending;
 use super::socket;
 
 /// Maximum number of open connections whose requests the gate has accepted.
 const MAX_CONNECTIONS: usize = 16;
+/// Maximum number of lent cards.
+const MAX_LENT: usize = 64;
 /// Maximum number of strangers: connections whose request's head is not read yet.
 const MAX_STRANGERS: usize = 16;
 /// Pause after a connection could not be accepted, such as for too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves connections until the process ends.
-pub(super) fn serve(listener: &TcpListener, gate: &Arc<Gate>, hub: &Arc<Hub>) {
-    let (connections, strangers) = (Arc::new(AtomicUsize::new(0)), Strangers::default());
-    loop {
-        let accepted = listener.accept().and_then(|(stream, _)| Ok((strangers.admit(&stream)?, stream)));
-        let Ok((stranger, stream)) = accepted else {
-            std::thread::sleep(PAUSE);
-            continue;
+/// Server of a view.
+pub(super) struct Server {
+    gate: Gate,
+    hub: Arc<Hub>,
+    /// What browsers need to lend cards; `None` if they may not.
+    lending: Option<Lending>,
+    connections: Arc<AtomicUsize>,
+    lent: Arc<AtomicUsize>,
+}
+
+impl Server {
+    pub(super) fn new(gate: Gate, hub: Arc<Hub>, lending: Option<Lending>) -> Self {
+        Self { gate, hub, lending, connections: Arc::default(), lent: Arc::default() }
+    }
+
+    /// Serves connections until the process ends.
+    pub(super) fn serve(self: &Arc<Self>, listener: &TcpListener) {
+        let strangers = Strangers::default();
+        loop {
+            let accepted = listener.accept().and_then(|(stream, _)| Ok((strangers.admit(&stream)?, stream)));
+            let Ok((stranger, stream)) = accepted else {
+                std::thread::sleep(PAUSE);
+                continue;
+            };
+            let server = self.clone();
+            let work = move || {
+                // An error closes this connection alone.
+                let _ = server.answer(stream, stranger);
+            };
+            let _ = std::thread::Builder::new().name("page".into()).spawn(work);
+        }
+    }
+
+    fn answer(&self, mut stream: TcpStream, stranger: Stranger) -> std::io::Result<()> {
+        stream.set_nodelay(true)?;
+        let checked = Head::read(&mut stream).and_then(|head| Ok((self.gate.check(&head)?, head)));
+        drop(stranger);
+        let (resource, head) = match checked {
+            Ok(checked) => checked,
+            Err(refusal) => return refusal.send(&mut stream),
         };
-        let (connections, gate, hub) = (connections.clone(), gate.clone(), hub.clone());
-        let work = move || {
-            // An error closes this connection alone.
-            let _ = answer(stream, stranger, &connections, &gate, &hub);
+        let places = match resource {
+            Resource::Card(_) => Place::take(&self.lent, MAX_LENT),
+            _ => Place::take(&self.connections, MAX_CONNECTIONS),
         };
-        let _ = std::thread::Builder::new().name("page".into()).spawn(work);
+        let Some(_place) = places else {
+            return Refusal::new(503, "Service Unavailable", "there are too many connections")
+                .send(&mut stream);
+        };
+        match (resource, &self.lending) {
+            (Resource::File(file), _) => send_file(&mut stream, file, head.one("host").unwrap_or_default()),
+            (Resource::Socket(key), _) => {
+                accept_socket(&mut stream, &key)?;
+                socket::attend(stream, &self.hub)
+            }
+            (Resource::Card(key), Some(lending)) => {
+                accept_socket(&mut stream, &key)?;
+                lending.attend(stream, &self.hub)
+            }
+            (Resource::Module, Some(lending)) => send_module(&mut stream, &lending.module),
+            // The gate refuses them where there is no lending.
+            (Resource::Card(_) | Resource::Module, None) => Ok(()),
+        }
     }
 }
 
@@ -86,40 +137,15 @@ impl Drop for Stranger {
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
-    fn take(connections: &Arc<AtomicUsize>) -> Option<Self> {
+    /// Takes one of `most` places; `None` if all are taken.
+    fn take(connections: &Arc<AtomicUsize>, most: usize) -> Option<Self> {
         let place = Self(connections.clone());
-        (connections.fetch_add(1, Ordering::Relaxed) < MAX_CONNECTIONS).then_some(place)
+        (connections.fetch_add(1, Ordering::Relaxed) < most).then_some(place)
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
-fn answer(
-    mut stream: TcpStream,
-    stranger: Stranger,
-    connections: &Arc<AtomicUsize>,
-    gate: &Gate,
-    hub: &Arc<Hub>,
-) -> std::io::Result<()> {
-    stream.set_nodelay(true)?;
-    let checked = Head::read(&mut stream).and_then(|head| Ok((gate.check(&head)?, head)));
-    drop(stranger);
-    let (resource, head) = match checked {
-        Ok(checked) => checked,
-        Err(refusal) => return refusal.send(&mut stream),
-    };
-    let Some(_place) = Place::take(connections) else {
-        return Refusal::new(503, "Service Unavailable", "there are too many connections").send(&mut stream);
-    };
-    match resource {
-        Resource::File(file) => send_file(&mut stream, file, head.one("host").unwrap_or_default()),
-        Resource::Socket(key) => {
-            accept_socket(&mut stream, &key)?;
-            socket::attend(stream, hub)
-        }
     }
 }

@@ -17,7 +17,7 @@ use super::state::PageNumber;
 /// Maximum size of a page's message, bytes.
 const MAX_MESSAGE: usize = 64 << 10;
 /// Time without a message to a page after which the page is pinged.
-const PING: Duration = Duration::from_secs(10);
+pub(super) const PING: Duration = Duration::from_secs(10);
 /// Time without a byte from a page after which it counts as gone: pages answer pings.
 const SILENCE: Duration = Duration::from_secs(40);
 /// Time without progress of a write after which the page counts as gone.
@@ -25,9 +25,7 @@ const STALLED: Duration = Duration::from_secs(20);
 
 /// Serves a page until its connection ends.
 pub(super) fn attend(stream: TcpStream, hub: &Arc<Hub>) -> std::io::Result<()> {
-    stream.set_read_timeout(Some(SILENCE))?;
-    stream.set_write_timeout(Some(STALLED))?;
-    let pipe = Pipe { stream: Arc::new(stream), lock: Arc::default() };
+    let pipe = Pipe::of(stream)?;
     let writing = pipe.clone();
     let page = hub.change(|view, _| view.connect());
     let is_open = AtomicBool::new(true);
@@ -35,25 +33,21 @@ pub(super) fn attend(stream: TcpStream, hub: &Arc<Hub>) -> std::io::Result<()> {
         let writer = || {
             // Any error ends the writer; the shutdown ends the reader.
             let _ = write(writing, page, hub, &is_open);
-            let _ = pipe.stream.shutdown(Shutdown::Both);
+            pipe.end();
         };
         let spawned = std::thread::Builder::new().name("page writer".into()).spawn_scoped(scope, writer);
         if spawned.is_ok() {
             let _ = read(pipe.clone(), page, hub);
         }
         is_open.store(false, Ordering::Relaxed);
-        let _ = pipe.stream.shutdown(Shutdown::Both);
+        pipe.end();
         hub.change(|view, _| view.disconnect(page));
     });
     Ok(())
 }
 
 fn read(pipe: Pipe, page: PageNumber, hub: &Hub) -> Result<(), Error> {
-    let config = WebSocketConfig::default()
-        .max_message_size(Some(MAX_MESSAGE))
-        .max_frame_size(Some(MAX_MESSAGE))
-        .read_buffer_size(MAX_MESSAGE);
-    let mut socket = WebSocket::from_raw_socket(pipe, Role::Server, Some(config));
+    let mut socket = WebSocket::from_raw_socket(pipe, Role::Server, Some(config(MAX_MESSAGE)));
     while !hub.is_over() {
         let stays = match socket.read()? {
             Message::Text(text) => hub.receive(page, &text),
@@ -83,11 +77,34 @@ fn write(pipe: Pipe, page: PageNumber, hub: &Hub, is_open: &AtomicBool) -> Resul
     Ok(())
 }
 
+/// Settings of a WebSocket that accepts messages of up to `largest` bytes.
+pub(super) fn config(largest: usize) -> WebSocketConfig {
+    WebSocketConfig::default()
+        .max_message_size(Some(largest))
+        .max_frame_size(Some(largest))
+        .read_buffer_size(largest.min(MAX_MESSAGE))
+}
+
 /// Stream that two threads share. A lock keeps the bytes of each write together.
 #[derive(Clone)]
-struct Pipe {
+pub(super) struct Pipe {
     stream: Arc<TcpStream>,
     lock: Arc<Mutex<()>>,
+}
+
+impl Pipe {
+    /// Shares a stream. Reads and writes of a page that is gone end with an error.
+    pub(super) fn of(stream: TcpStream) -> std::io::Result<Self> {
+        stream.set_read_timeout(Some(SILENCE))?;
+        stream.set_write_timeout(Some(STALLED))?;
+        Ok(Self { stream: Arc::new(stream), lock: Arc::default() })
+    }
+
+    /// Ends the stream for both threads.
+    pub(super) fn end(&self) {
+        // The other end may have ended it already.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
 }
 
 impl Read for Pipe {

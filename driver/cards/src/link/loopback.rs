@@ -86,6 +86,15 @@ impl LoopbackPort {
         self
     }
 
+    /// Second handle of this end, so that one thread reads while another writes. Dropping either closes the
+    /// link.
+    #[must_use]
+    pub fn twin(&self) -> Self {
+        let Self { incoming, outgoing, capacity, wakes_at, .. } = self;
+        let (incoming, outgoing) = (incoming.clone(), outgoing.clone());
+        Self { incoming, outgoing, capacity: *capacity, wakes_at: *wakes_at, written: None }
+    }
+
     /// Wakes the reader of pending writes if `is_due`, or if they have waited for [`PATIENCE`].
     fn wake(&mut self, is_due: bool) {
         if self.written.is_some_and(|written| is_due || written.elapsed() >= PATIENCE) {

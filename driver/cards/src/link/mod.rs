@@ -7,10 +7,12 @@
 //! browsers, have only the loopback and the fault injector.
 
 mod fault_injector;
+mod lent;
 mod loopback;
 mod system;
 
 pub use fault_injector::{FaultInjector, LineFaults};
+pub use lent::LentCard;
 pub use loopback::{LoopbackPort, loopback};
 #[cfg(not(target_family = "wasm"))]
 pub use system::{

@@ -16,9 +16,9 @@ use super::setting::Changes::{Cards, Nothing, Pixels, Work};
 use super::setting::{Setting, UNSTATED, list, name, optional, place, setting, value};
 use crate::address::CardAddress;
 use crate::display::DisplaySettings;
-use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::trace::TraceSettings;
+use crate::emulator::{Emulated, EmulatedKind};
 use crate::partial::PartialSettings;
 use crate::parts::Part;
 
@@ -417,6 +417,15 @@ impl CardSet {
             .iter()
             .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
         each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
+    }
+
+    /// Chip of the first emulated card, or the reference chip if no card is emulated.
+    pub fn emulated_chip(&self) -> Emulated {
+        let chip = self.addresses.iter().find_map(|address| match address {
+            CardAddress::Emulated { model, memory, .. } => Some(model.kind().emulated().with_memory(*memory)),
+            CardAddress::Remote(_) => None,
+        });
+        chip.unwrap_or_else(|| EmulatedKind::Reference.emulated())
     }
 
     /// Caches of the first emulated card's model, or of the reference chip if no card is emulated.

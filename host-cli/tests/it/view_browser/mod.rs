@@ -5,6 +5,7 @@ mod browser;
 mod devices;
 mod firefox;
 mod latency;
+mod lending;
 mod lighting;
 mod own_host;
 mod person;

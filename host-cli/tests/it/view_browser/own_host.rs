@@ -1,5 +1,6 @@
 //! The page whose host runs in the browser, served as plain files.
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;
 
@@ -18,14 +19,20 @@ const LIMIT: Duration = Duration::from_secs(150);
 const SMALL: &str =
     "--quality paper --size 80x80 --photons 2000 --gather-rays 4 --neighbors 10 --shadow-rays 1 --spp 2";
 
+/// WebAssembly module that browsers run; `None`, with a message, if there is none.
+pub(super) fn module() -> Option<OsString> {
+    let module = std::env::var_os("PHOTONCARD_TEST_MODULE");
+    if module.is_none() {
+        skip(
+            "hosts and cards in a browser: PHOTONCARD_TEST_MODULE names no module, which host-cli/module.sh FILE builds",
+        );
+    }
+    module
+}
+
 /// Writes the page into the folder `site`; `None` if there is no module.
 fn site(room: &Room) -> Option<FileServer> {
-    let Some(module) = std::env::var_os("PHOTONCARD_TEST_MODULE") else {
-        skip(
-            "the page of a browser's own host: PHOTONCARD_TEST_MODULE names no module, which host-cli/module.sh FILE builds",
-        );
-        return None;
-    };
+    let module = module()?;
     let scenes = [shipped("cornell.gltf"), shipped("room.glb")];
     let mut command = room.command();
     command.args(["page", "site", "--scene", &scenes[0], "--scene", &scenes[1], "--module"]).arg(module);

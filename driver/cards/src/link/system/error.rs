@@ -48,7 +48,7 @@ impl LinkError {
     }
 
     /// Error of connecting to a socket.
-    pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
+    pub(crate) fn connect(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
             ErrorKind::NotFound => {
                 ("there is no such socket", "start the card that listens there, or check the path")
@@ -61,6 +61,9 @@ impl LinkError {
             }
             ErrorKind::TimedOut | ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable => {
                 ("it does not answer", "check the network, the address and firewalls")
+            }
+            ErrorKind::NotConnected => {
+                ("its owner has taken it back", "ask its owner, or leave the card out")
             }
             ErrorKind::Unsupported => (UNIX_ONLY, "use a card on a TCP port: tcp:HOST:PORT"),
             _ => return Self::other("connect to", address, error, "check the address"),

@@ -19,6 +19,7 @@ pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError>
         }
         RemoteAddress::Tcp { host, port } => super::connect_tcp(host, *port).map(|port| Box::new(port) as _),
         RemoteAddress::Unix { path } => super::connect_unix(path).map(|port| Box::new(port) as _),
+        RemoteAddress::Lent(card) => card.open().map(|port| Box::new(port) as _),
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::super::LentCard;
 use super::serial_options::SerialOptions;
 
 /// Address of a card that is not emulated in this process.
@@ -30,6 +31,8 @@ pub enum RemoteAddress {
         /// Path of the socket.
         path: PathBuf,
     },
+    /// Card that another part of this process lends. It has no text form that is parsed.
+    Lent(LentCard),
 }
 
 /// Default speed of a serial port, bit/s.
@@ -54,7 +57,7 @@ impl RemoteAddress {
     pub fn wait_for_return(&self) -> Duration {
         match self {
             Self::Serial { options, .. } => options.wait(),
-            Self::Tcp { .. } | Self::Unix { .. } => Duration::ZERO,
+            Self::Tcp { .. } | Self::Unix { .. } | Self::Lent(_) => Duration::ZERO,
         }
     }
 
@@ -80,6 +83,7 @@ impl fmt::Display for RemoteAddress {
             Self::Serial { path, baud, options } => write!(f, "serial:{}@{baud}{options}", path.display()),
             Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
             Self::Unix { path } => write!(f, "unix:{}", path.display()),
+            Self::Lent(card) => card.fmt(f),
         }
     }
 }
