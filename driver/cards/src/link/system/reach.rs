@@ -10,7 +10,7 @@ use super::{LinkError, RemoteAddress};
 /// Connects to the card at an address.
 ///
 /// # Errors
-/// If the port or socket cannot be opened. In a browser, always.
+/// If the port or socket cannot be opened.
 #[cfg(not(target_family = "wasm"))]
 pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError> {
     match address {
@@ -26,8 +26,11 @@ pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError>
 /// Connects to the card at an address.
 ///
 /// # Errors
-/// Always: a browser has no such links.
+/// Unless the card is lent: a browser has no other links.
 #[cfg(target_family = "wasm")]
 pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError> {
-    Err(LinkError::connect(address, &ErrorKind::Unsupported.into()))
+    match address {
+        RemoteAddress::Lent(card) => card.open().map(|port| Box::new(port) as _),
+        _ => Err(LinkError::connect(address, &ErrorKind::Unsupported.into())),
+    }
 }
