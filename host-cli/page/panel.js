@@ -143,6 +143,8 @@ export class Panel {
 
     cards(cards) {
         document.getElementById("cards").replaceChildren(...cards.map(({ name, state, tiles, error }, index) => {
+            // Tiles keep the number of their card, so that one that has gone keeps its place.
+            if (state === "gone") return "";
             const swatch = element("span", { className: "swatch" });
             swatch.style.background = `rgb(${cardColour(index).map(part => Math.round(255 * part)).join()})`;
             const told = element("span", { className: state, textContent: ` ${state}` });

@@ -15,12 +15,12 @@ const BUILD: &str = "build it by host-cli/module.sh FILE";
 /// Reads the module: the stated one, or that of this program's package.
 ///
 /// # Errors
-/// If there is none, or the file is none.
+/// If no module is found, or the file cannot be read or is no WebAssembly module.
 pub(crate) fn read(stated: Option<&Path>) -> Result<Vec<u8>, Failure> {
     let packed = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join(PACKED)));
     let packed = packed.filter(|path| stated.is_none() && path.is_file());
     let Some(path) = stated.or(packed.as_deref()) else {
-        let text = "the module of a page is not beside this program".to_owned();
+        let text = "the WebAssembly module is not beside this program".to_owned();
         return Err(refused(text, &format!("{BUILD}, and state it: --module FILE")));
     };
     let bytes = std::fs::read(path)

@@ -2,13 +2,13 @@
 # Cameras in a room that others made (Benedikt Bitterli's collection) beside Mitsuba's path tracer: pinhole, lens
 # shift, thin lens, orthographic, panorama. Errors of means over blocks of 12x12 pixels.
 #
-#   tests/peers/cameras.sh PHOTONCARD [--seeds N] [--passes N] [NAME ..] [-- OPTION ..]
+#   tests/peers/cameras.sh PHOTONCARD [--seeds N] [--passes N] [--camera CAMERA] [NAME ..] [-- OPTION ..]
 #
 # Surfaces are made Lambertian, so that both programs have the same. References take minutes each. ROOMS may name
 # the folder of the rooms; without it they are fetched. PNGs are left in target/peers/rooms: reference, picture.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
-    echo "usage: $0 PHOTONCARD [--seeds N] [--passes N] [NAME ..] [-- OPTION ..]" >&2
+    echo "usage: $0 PHOTONCARD [--seeds N] [--passes N] [--camera CAMERA] [NAME ..] [-- OPTION ..]" >&2
     exit 2
 }
 photoncard=$(realpath "$1")

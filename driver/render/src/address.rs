@@ -80,10 +80,11 @@ impl CardAddress {
     }
 
     /// Name of card number `index` of a render in error messages. The name of a remote card includes this
-    /// address.
+    /// address, and that of a lent card is its own: lent cards come and go.
     pub(super) fn name_of(&self, index: usize) -> String {
         match self {
             Self::Emulated { .. } => format!("card {index}"),
+            Self::Remote(RemoteAddress::Lent(card)) => card.to_string(),
             Self::Remote(address) => format!("card {index} ({address})"),
         }
     }

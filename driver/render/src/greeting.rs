@@ -132,7 +132,8 @@ pub(super) async fn greet(
     let end = Instant::now() + TURN;
     let (session, budget) = loop {
         match greet_port(&mut card, hands, start, observer).await {
-            Err(GreetingError::Card(CardError::Refused)) if Instant::now() < end => {
+            // The link of a card in this process is closed for good.
+            Err(GreetingError::Card(CardError::Refused)) if !card.is_emulated() && Instant::now() < end => {
                 std::thread::sleep(PAUSE);
                 if !card.reach_again() {
                     return Err(CardError::Refused.into());

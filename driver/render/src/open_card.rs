@@ -95,8 +95,7 @@ impl OpenCard {
         }
     }
 
-    /// Closes the link to a remote card and opens it again. Returns whether it is open; `false` for an
-    /// emulated card.
+    /// Closes the link to a remote card and opens it again. Returns whether it is open.
     pub(super) fn reach_again(&mut self) -> bool {
         let reached = self.close().and_then(|address| reach(&address).ok());
         let is_open = reached.is_some();

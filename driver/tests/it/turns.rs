@@ -129,9 +129,11 @@ fn a_render_in_turns_equals_one_on_threads() {
 fn tiles_of_a_lost_worker_are_rendered_by_others() {
     let (scene, settings) = (cornell(), settings());
     let expected = Renderer::default().render(&scene, &settings, &Unobserved).unwrap().film;
-    let (rendering, _) = in_turns(&mut Renderer::with_workers(workers(4000)), &scene, &settings, None);
-    let rendering = rendering.unwrap();
-    assert!(bits(&rendering.film) == bits(&expected));
+    // It is lost before it has answered, and while it renders.
+    for bytes in [0, 4000] {
+        let (rendering, _) = in_turns(&mut Renderer::with_workers(workers(bytes)), &scene, &settings, None);
+        assert!(bits(&rendering.unwrap().film) == bits(&expected), "{bytes}");
+    }
 
     let alone = settings.with(|settings| settings.cards.addresses = vec!["emulated:1".parse().unwrap()]);
     let (rendering, _) = in_turns(&mut Renderer::with_workers(workers(4000)), &scene, &alone, None);

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use photoncard_driver::link::{LentCard, RemoteAddress};
 use photoncard_driver::render::{CardAddress, CardSet};
 use serde_json::{Value, json};
 
@@ -16,6 +17,8 @@ enum Standing {
     Absent,
     Ready,
     Lost,
+    /// A lent card has gone; its place is free.
+    Gone,
 }
 
 struct Card {
@@ -27,6 +30,17 @@ struct Card {
     error: Option<String>,
     try_at: Duration,
     pause: Duration,
+}
+
+impl Card {
+    fn is_lent(&self) -> bool {
+        matches!(self.address, Some(CardAddress::Remote(RemoteAddress::Lent(_))))
+    }
+}
+
+/// Address of a lent card.
+pub(super) fn of_lent(card: &LentCard) -> CardAddress {
+    CardAddress::Remote(RemoteAddress::Lent(card.clone()))
 }
 
 /// Cards of a view.
@@ -53,21 +67,50 @@ impl CardBoard {
         Self { cards: set.names().into_iter().zip(addresses).map(card).collect() }
     }
 
-    /// Takes another set of cards. Those that stay keep their states.
-    pub(super) fn replace(&mut self, set: &CardSet) {
-        let before = std::mem::replace(self, Self::new(set)).cards;
-        for card in &mut self.cards {
-            let is_same = |other: &Card| match &card.address {
-                Some(address) => other.address.as_ref() == Some(address),
-                None => other.name == card.name,
-            };
-            if let Some(other) = before.iter().find(|other| is_same(other)) {
-                let Card { standing, tiles, try_at, pause, .. } = *other;
-                let error = other.error.clone();
-                (card.standing, card.tiles, card.error) = (standing, tiles, error);
-                (card.try_at, card.pause) = (try_at, pause);
-            }
+    fn of_address(&mut self, address: &CardAddress) -> Option<&mut Card> {
+        self.cards.iter_mut().find(|card| card.address.as_ref() == Some(address))
+    }
+
+    /// Adds a lent card that has answered, or takes it back after a loss. It has the place of one that has
+    /// gone, if any: the numbers of the others stay.
+    pub(super) fn borrow(&mut self, lent: &LentCard) {
+        let address = of_lent(lent);
+        let card = Card {
+            name: lent.to_string(),
+            address: Some(address.clone()),
+            standing: Standing::Ready,
+            tiles: 0,
+            error: None,
+            try_at: Duration::ZERO,
+            pause: FIRST_PAUSE,
+        };
+        if let Some(known) = self.of_address(&address) {
+            (known.standing, known.error) = (Standing::Ready, None);
+        } else if let Some(gone) = self.cards.iter_mut().find(|card| card.standing == Standing::Gone) {
+            *gone = card;
+        } else {
+            self.cards.push(card);
         }
+    }
+
+    /// Records that a lent card has gone for good.
+    pub(super) fn leave(&mut self, lent: &LentCard) {
+        if let Some(card) = self.of_address(&of_lent(lent)) {
+            card.standing = Standing::Gone;
+        }
+    }
+
+    /// Addresses of the lent cards that are ready.
+    pub(super) fn lent(&self) -> impl Iterator<Item = CardAddress> {
+        let is_ready = |card: &&Card| card.standing == Standing::Ready && card.is_lent();
+        self.cards.iter().filter(is_ready).filter_map(|card| card.address.clone())
+    }
+
+    /// Tiles that a lent card has rendered; `None` unless it is ready.
+    pub(super) fn tiles_of(&self, lent: &LentCard) -> Option<u64> {
+        let address = of_lent(lent);
+        let card = self.cards.iter().find(|card| card.address.as_ref() == Some(&address))?;
+        (card.standing == Standing::Ready).then_some(card.tiles)
     }
 
     fn of_name(&mut self, name: &str) -> Option<(usize, &mut Card)> {
@@ -92,21 +135,22 @@ impl CardBoard {
         }
     }
 
-    /// Returns a lost remote card, with its index, for which an attempt to reconnect is due. Doubles the
-    /// card's pause.
-    pub(super) fn next_to_try(&mut self, now: Duration) -> Option<(usize, CardAddress)> {
-        let is_due =
-            |card: &Card| card.standing == Standing::Lost && card.address.is_some() && card.try_at <= now;
-        let (number, card) = self.cards.iter_mut().enumerate().find(|(_, card)| is_due(card))?;
+    /// Returns a lost remote card of the command for which an attempt to reconnect is due. Doubles the card's
+    /// pause.
+    pub(super) fn next_to_try(&mut self, now: Duration) -> Option<CardAddress> {
+        let is_due = |card: &Card| {
+            card.standing == Standing::Lost && card.address.is_some() && !card.is_lent() && card.try_at <= now
+        };
+        let card = self.cards.iter_mut().find(|card| is_due(card))?;
         let address = card.address.clone()?;
         card.pause = MAX_PAUSE.min(2 * card.pause);
         card.try_at = now + card.pause;
-        Some((number, address))
+        Some(address)
     }
 
     /// Records that a lost card has answered.
-    pub(super) fn returns(&mut self, number: usize) {
-        if let Some(card) = self.cards.get_mut(number) {
+    pub(super) fn returns(&mut self, address: &CardAddress) {
+        if let Some(card) = self.of_address(address) {
             (card.standing, card.error) = (Standing::Ready, None);
         }
     }
@@ -118,9 +162,37 @@ impl CardBoard {
                 Standing::Absent => "absent",
                 Standing::Ready => "ready",
                 Standing::Lost => "lost",
+                Standing::Gone => "gone",
             };
             json!({"name": card.name, "state": state, "tiles": card.tiles, "error": card.error})
         };
         json!({"type": "cards", "cards": self.cards.iter().map(card).collect::<Vec<_>>()})
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_cards_stay_when_lent_cards_come_and_go() {
+        let set = CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() };
+        let mut board = CardBoard::new(&set);
+        let [(a, _a), (b, _b), (c, _c)] = ["a", "b", "c"].map(LentCard::lend);
+        board.borrow(&a);
+        board.borrow(&b);
+        assert_eq!((board.rendered("a"), board.rendered("b")), ((2, false), (3, false)));
+        board.leave(&a);
+        assert_eq!((board.rendered("b").0, board.tiles_of(&b), board.tiles_of(&a)), (3, Some(2), None));
+        board.borrow(&c);
+        assert_eq!(board.rendered("c").0, 2);
+        assert!(board.lent().eq([of_lent(&c), of_lent(&b)]));
+
+        // A lost card is left out until it has answered. Its own connection looks for it.
+        board.lose("b", "it is silent".into(), Duration::ZERO);
+        assert!(board.lent().eq([of_lent(&c)]));
+        assert_eq!(board.next_to_try(Duration::from_secs(100)), None);
+        board.borrow(&b);
+        assert_eq!((board.lent().count(), board.tiles_of(&b)), (2, Some(2)));
     }
 }

@@ -150,10 +150,10 @@ fn open_in_browser(url: &str) -> std::io::Result<()> {
 fn look_for_cards(hub: &Hub) {
     while !hub.is_over() {
         std::thread::sleep(LOOK);
-        let Some((number, address)) = hub.change(|view, now| view.cards.next_to_try(now)) else { continue };
+        let Some(address) = hub.change(|view, now| view.cards.next_to_try(now)) else { continue };
         if card_ping(&address, 1).is_ok() {
             std::thread::sleep(CHANGE_OF_HOSTS);
-            hub.card_returns(number);
+            hub.card_returns(&address);
         }
     }
 }

@@ -122,11 +122,17 @@ impl Head {
 }
 
 /// Sends a file of the page. The response allows the page to open a WebSocket to `host`, the request's
-/// `Host`, and to run the WebAssembly of this server.
-pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
+/// `Host`, and to run WebAssembly if it `has_module`.
+pub(super) fn send_file(
+    stream: &mut TcpStream,
+    file: &PageFile,
+    host: &str,
+    has_module: bool,
+) -> std::io::Result<()> {
+    let scripts = if has_module { "script-src 'self' 'wasm-unsafe-eval'; " } else { "" };
     // Not all browsers let `'self'` stand for the server's WebSocket.
     let policy = format!(
-        "Content-Security-Policy: default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self' ws://{host}; \
+        "Content-Security-Policy: default-src 'self'; {scripts}connect-src 'self' ws://{host}; \
          img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"
     );
     respond(stream, "200 OK", file.kind, &policy, file.text.as_bytes())

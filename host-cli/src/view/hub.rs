@@ -10,8 +10,9 @@ use photoncard_driver::cryptomatte::Identities;
 use photoncard_driver::exr::mix::{Gain, Mix, MixError};
 use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
+use photoncard_driver::link::LentCard;
 use photoncard_driver::output;
-use photoncard_driver::render::{NamedSettings, Rendering, turn};
+use photoncard_driver::render::{CardAddress, NamedSettings, Rendering, turn};
 use photoncard_driver::tone_mapping::{ToneMapping, png_bytes};
 use serde_json::{Value, json};
 
@@ -106,6 +107,11 @@ impl Hub {
         drop(view);
         self.changed.notify_all();
         result
+    }
+
+    /// Reads the state by `act`.
+    pub(super) fn look<T>(&self, act: impl FnOnce(&View) -> T) -> T {
+        act(&self.lock())
     }
 
     /// Returns whether the running pass should stop.
@@ -276,9 +282,15 @@ impl Hub {
     }
 
     /// Records that a remote card answers again.
-    pub(super) fn card_returns(&self, number: usize) {
+    pub(super) fn card_returns(&self, address: &CardAddress) {
         self.is_card_back.store(true, Ordering::Relaxed);
-        self.change(|view, _| view.card_returns(number));
+        self.change(|view, _| view.card_returns(address));
+    }
+
+    /// Adds a lent card that has answered.
+    pub(super) fn borrow_card(&self, card: &LentCard) {
+        self.is_card_back.store(true, Ordering::Relaxed);
+        self.change(|view, _| view.borrow_card(card));
     }
 
     /// Returns whether a card has returned since the last call.

@@ -9,10 +9,12 @@ use std::time::{Duration, Instant};
 
 use photoncard_driver::emulator::Emulated;
 use photoncard_driver::link::{LentCard, LoopbackPort};
+use photoncard_driver::render::card_ping;
 use photoncard_shared::link::Port;
 use tungstenite::protocol::Role;
 use tungstenite::{Error, Message, WebSocket};
 
+use super::cards::of_lent;
 use super::hub::Hub;
 use super::socket::{PING, Pipe, config};
 
@@ -20,6 +22,8 @@ use super::socket::{PING, Pipe, config};
 const MAX_MESSAGE: usize = 4 << 20;
 /// Interval of checks whether the page is gone.
 const LOOK: Duration = Duration::from_millis(100);
+/// Maximum pause before a lost card is greeted.
+const MAX_PAUSE: Duration = Duration::from_secs(30);
 /// Bytes of a message to a card.
 const BLOCK: usize = 16 << 10;
 
@@ -42,22 +46,26 @@ impl Lending {
         let number = self.lent.fetch_add(1, Ordering::Relaxed) + 1;
         let (card, links) = LentCard::lend(&format!("browser {number} at {}", stream.peer_addr()?.ip()));
         let owner = Owner { pipe: Pipe::of(stream)?, link: Mutex::new(None), is_open: AtomicBool::new(true) };
-        hub.change(|view, _| view.borrow_card(&card));
         let (owner, chip) = (&owner, self.chip.as_str());
+        let writer = move || {
+            let _ = owner.write(&links, chip);
+        };
         std::thread::scope(|scope| {
-            let writer = move || {
-                // Any error ends the writer; the end of the pipe ends the reader.
-                let _ = owner.write(&links, chip);
-                owner.pipe.end();
+            // The thread that ends first ends the others by the end of the pipe.
+            let spawn = |work: Box<dyn FnOnce() + Send>| {
+                let work = move || {
+                    work();
+                    owner.end();
+                };
+                std::thread::Builder::new().name("lent card".into()).spawn_scoped(scope, work)
             };
-            if std::thread::Builder::new().name("lent card".into()).spawn_scoped(scope, writer).is_ok() {
+            if spawn(Box::new(writer)).is_ok() && spawn(Box::new(|| owner.greet(&card, hub))).is_ok() {
                 let _ = owner.read(hub);
             }
-            owner.is_open.store(false, Ordering::Relaxed);
-            owner.pipe.end();
+            owner.end();
             owner.change_link(None);
-            hub.change(|view, _| view.return_card(&card));
         });
+        hub.change(|view, _| view.return_card(&card));
         Ok(())
     }
 }
@@ -75,13 +83,44 @@ impl Owner {
         *self.link.lock().unwrap_or_else(PoisonError::into_inner) = link;
     }
 
+    fn is_open(&self) -> bool {
+        self.is_open.load(Ordering::Relaxed)
+    }
+
+    /// Ends all work for the card.
+    fn end(&self) {
+        self.is_open.store(false, Ordering::Relaxed);
+        self.pipe.end();
+    }
+
+    /// Adds the card to the view whenever it answers: at first, and after a loss. A card that is lost again
+    /// without a tile waits longer each time.
+    fn greet(&self, card: &LentCard, hub: &Hub) {
+        let (mut pause, mut seen) = (LOOK, 0);
+        while self.is_open() && !hub.is_over() {
+            let tiles = hub.look(|view| view.cards.tiles_of(card));
+            match tiles {
+                Some(tiles) if tiles > seen => (pause, seen) = (LOOK, tiles),
+                Some(_) => {}
+                None => {
+                    std::thread::sleep(pause);
+                    pause = MAX_PAUSE.min(2 * pause);
+                    if card_ping(&of_lent(card), 1).is_ok() && self.is_open() {
+                        hub.borrow_card(card);
+                    }
+                }
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
     /// Sends the bytes of hosts to the page; the chip before those of each link.
     fn write(&self, links: &Receiver<LoopbackPort>, chip: &str) -> Result<(), Error> {
         let mut socket = WebSocket::from_raw_socket(self.pipe.clone(), Role::Server, None);
         let mut last = Instant::now();
         let mut link: Option<LoopbackPort> = None;
         let mut block = [0; BLOCK];
-        while self.is_open.load(Ordering::Relaxed) {
+        while self.is_open() {
             let message = match &mut link {
                 None => match links.recv_timeout(LOOK) {
                     Ok(opened) => {

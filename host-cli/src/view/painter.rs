@@ -215,7 +215,7 @@ impl Painter {
                 settings.integrator.planned_samples = Some(asked.planned());
                 settings.schedule.keep_records = asked.samples > 1;
                 // Browsers may lend cards between passes.
-                settings.cards = self.hub.change(|view, _| view.with_lent_cards(&settings.cards));
+                settings.cards.addresses.extend(self.hub.look(|view| view.cards.lent().collect::<Vec<_>>()));
             })
         };
         let mut samples = 1;

@@ -76,7 +76,10 @@ impl Server {
                 .send(&mut stream);
         };
         match (resource, &self.lending) {
-            (Resource::File(file), _) => send_file(&mut stream, file, head.one("host").unwrap_or_default()),
+            (Resource::File(file), lending) => {
+                let host = head.one("host").unwrap_or_default();
+                send_file(&mut stream, file, host, lending.is_some())
+            }
             (Resource::Socket(key), _) => {
                 accept_socket(&mut stream, &key)?;
                 socket::attend(stream, &self.hub)

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use photoncard_driver::film::Film;
-use photoncard_driver::link::{LentCard, RemoteAddress};
+use photoncard_driver::link::LentCard;
 use photoncard_driver::quality::{Finish, Quality};
-use photoncard_driver::render::{CardAddress, CardSet, NamedSettings, RenderError, RenderSettings};
+use photoncard_driver::render::{CardAddress, NamedSettings, RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
 use photoncard_shared::budget::MAX_LIGHT_GROUPS;
 use serde_json::{Value, json};
@@ -127,8 +127,6 @@ pub(super) struct View {
     /// Pixel near which tiles are rendered first.
     pub(super) cursor: Option<[u32; 2]>,
     pub(super) cards: CardBoard,
-    /// Cards that browsers lend, behind those of the command.
-    lent: Vec<LentCard>,
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
@@ -166,7 +164,6 @@ impl View {
             gains: [[1.0; 3]; MAX_LIGHT_GROUPS],
             of_size: 0,
             cursor: None,
-            lent: Vec::new(),
             pages: BTreeMap::new(),
             next_page: 0,
             steering: None,
@@ -538,36 +535,22 @@ impl View {
         Ok(())
     }
 
-    /// Adds a card that a browser lends, from the next picture on.
+    /// Adds a card that a browser lends, from the next pass on.
     pub(super) fn borrow_card(&mut self, card: &LentCard) {
-        self.lent.push(card.clone());
-        self.lent_cards_change();
+        self.cards.borrow(card);
         self.refinement.card_returns();
+        self.revisions.cards += 1;
     }
 
     /// Removes a card that a browser has lent.
     pub(super) fn return_card(&mut self, card: &LentCard) {
-        self.lent.retain(|lent| lent != card);
-        self.lent_cards_change();
-    }
-
-    fn lent_cards_change(&mut self) {
-        let set = self.with_lent_cards(&self.wish.settings.cards);
-        self.cards.replace(&set);
+        self.cards.leave(card);
         self.revisions.cards += 1;
     }
 
-    /// Cards of the command, and those that browsers lend.
-    pub(super) fn with_lent_cards(&self, own: &CardSet) -> CardSet {
-        let mut set = own.clone();
-        set.addresses
-            .extend(self.lent.iter().map(|card| CardAddress::Remote(RemoteAddress::Lent(card.clone()))));
-        set
-    }
-
     /// Records that a lost card has answered.
-    pub(super) fn card_returns(&mut self, number: usize) {
-        self.cards.returns(number);
+    pub(super) fn card_returns(&mut self, address: &CardAddress) {
+        self.cards.returns(address);
         self.refinement.card_returns();
         self.revisions.cards += 1;
     }

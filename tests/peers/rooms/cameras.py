@@ -40,6 +40,7 @@ def main():
     parser.add_argument("--folder", type=Path, required=True, help="where files go")
     parser.add_argument("--seeds", type=int, default=4, help="pictures of photoncard [default: 4]")
     parser.add_argument("--passes", type=int, default=16, help=f"of {SAMPLES} samples of a reference [default: 16]")
+    parser.add_argument("--camera", action="append", help="a camera; may be repeated [default: all]")
     words = sys.argv[1:]
     place = words.index("--") if "--" in words else len(words)
     arguments, options = parser.parse_args(words[:place]), words[place + 1 :]
@@ -47,6 +48,8 @@ def main():
     for name in arguments.names or ["living-room"]:
         room = convert(arguments, name)
         for camera, words, truth in cameras(room, arguments.passes):
+            if camera not in (arguments.camera or [camera]):
+                continue
             pictures = [render(arguments, room, camera, [*words, *options], seed) for seed in range(1, 1 + arguments.seeds)]
             report(arguments.folder, name, camera, pictures, truth())
 

@@ -1,7 +1,6 @@
 //! Links to cards that another part of this program reaches, such as those in pages of browsers.
 
 use std::fmt;
-use std::io::ErrorKind;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -34,7 +33,7 @@ impl LentCard {
     pub(super) fn open(&self) -> Result<LoopbackPort, LinkError> {
         let (host, card) = loopback(CAPACITY);
         let sent = self.links.send(card);
-        sent.map(|()| host).map_err(|_| LinkError::connect(self, &ErrorKind::NotConnected.into()))
+        sent.map(|()| host).map_err(|_| LinkError::taken_back(self))
     }
 }
 

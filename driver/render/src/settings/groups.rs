@@ -15,6 +15,7 @@ use serde_json::{Map, Value, json};
 use super::setting::Changes::{Cards, Nothing, Pixels, Work};
 use super::setting::{Setting, UNSTATED, list, name, optional, place, setting, value};
 use crate::address::CardAddress;
+use crate::chip::ChipModel;
 use crate::display::DisplaySettings;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::trace::TraceSettings;
@@ -421,20 +422,21 @@ impl CardSet {
 
     /// Chip of the first emulated card, or the reference chip if no card is emulated.
     pub fn emulated_chip(&self) -> Emulated {
-        let chip = self.addresses.iter().find_map(|address| match address {
-            CardAddress::Emulated { model, memory, .. } => Some(model.kind().emulated().with_memory(*memory)),
-            CardAddress::Remote(_) => None,
-        });
+        let chip = self.first_emulated().map(|(model, memory)| model.kind().emulated().with_memory(memory));
         chip.unwrap_or_else(|| EmulatedKind::Reference.emulated())
     }
 
     /// Caches of the first emulated card's model, or of the reference chip if no card is emulated.
     pub fn own_caches(&self) -> CacheSettings {
-        let caches = self.addresses.iter().find_map(|address| match address {
-            CardAddress::Emulated { model, .. } => Some(model.caches()),
+        self.first_emulated().map_or_else(|| EmulatedKind::Reference.caches(), |(model, _)| model.caches())
+    }
+
+    /// Model and memory of the first emulated card.
+    fn first_emulated(&self) -> Option<(&ChipModel, u64)> {
+        self.addresses.iter().find_map(|address| match address {
+            CardAddress::Emulated { model, memory, .. } => Some((model, *memory)),
             CardAddress::Remote(_) => None,
-        });
-        caches.unwrap_or_else(|| EmulatedKind::Reference.caches())
+        })
     }
 }
 

@@ -41,10 +41,10 @@ fn act(world: &mut World, random: &mut Random) {
         1 if pages.len() > 1 => world.disconnect(random.one(&pages)),
         2 => world.has_card = random.below(3) > 0,
         3 => {
-            if let Some((number, _)) = world.view.cards.next_to_try(world.now)
+            if let Some(address) = world.view.cards.next_to_try(world.now)
                 && world.has_card
             {
-                world.view.card_returns(number);
+                world.view.card_returns(&address);
             }
         }
         4 => world.now += Duration::from_millis(random.below(400)),

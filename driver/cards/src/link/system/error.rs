@@ -48,7 +48,7 @@ impl LinkError {
     }
 
     /// Error of connecting to a socket.
-    pub(crate) fn connect(address: impl Display, error: &io::Error) -> Self {
+    pub(super) fn connect(address: impl Display, error: &io::Error) -> Self {
         let (reason, remedy) = match error.kind() {
             ErrorKind::NotFound => {
                 ("there is no such socket", "start the card that listens there, or check the path")
@@ -62,13 +62,15 @@ impl LinkError {
             ErrorKind::TimedOut | ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable => {
                 ("it does not answer", "check the network, the address and firewalls")
             }
-            ErrorKind::NotConnected => {
-                ("its owner has taken it back", "ask its owner, or leave the card out")
-            }
             ErrorKind::Unsupported => (UNIX_ONLY, "use a card on a TCP port: tcp:HOST:PORT"),
             _ => return Self::other("connect to", address, error, "check the address"),
         };
         Self::new("connect to", address, reason, remedy)
+    }
+
+    /// Error of reaching a card that is no longer lent.
+    pub(crate) fn taken_back(card: impl Display) -> Self {
+        Self::new("connect to", card, "its owner has taken it back", "ask its owner, or leave the card out")
     }
 
     /// Error of listening on an address.
