@@ -1,7 +1,7 @@
 //! Command `photoncard page`: a page that has its own host, as files for any web server.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::output;
@@ -38,8 +38,12 @@ pub(crate) fn run(options: &PageOptions) -> Result<(), Failure> {
     let folder = &options.folder;
     check_folder(folder)?;
     let files = files(module, scenes);
+    let outdated = outdated(folder, &files);
     for (name, bytes) in &files {
         write(&folder.join(name), bytes)?;
+    }
+    for path in outdated {
+        fs::remove_file(&path).map_err(|error| Failure::work_error(&error))?;
     }
     print(&[format!("{}: {} files, for any web server", folder.display(), files.len())])
 }
@@ -83,6 +87,17 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 
 fn refused(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
+
+/// Files of an earlier page in the folder that the page no longer has, such as other scenes.
+fn outdated(folder: &Path, files: &[File]) -> Vec<PathBuf> {
+    let listed = fs::read(folder.join(LIST)).unwrap_or_default();
+    let listed: Vec<String> = serde_json::from_slice(&listed).unwrap_or_default();
+    // Names that lead out of the folder are none of this command's.
+    let is_inside =
+        |name: &str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    let is_old = |name: &String| is_inside(name) && !files.iter().any(|(file, _)| file == name);
+    listed.into_iter().filter(is_old).map(|name| folder.join(name)).filter(|path| path.is_file()).collect()
 }
 
 /// Reads scenes for the page's list.

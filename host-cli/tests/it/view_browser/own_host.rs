@@ -176,3 +176,23 @@ fn a_folder_with_other_files_is_not_written() {
     assert!(room.run(&["page", "new", "--module", "module.wasm"]).status == Some(0));
     assert!(Path::new(&room.path("new/index.html")).is_file());
 }
+
+#[test]
+fn a_page_that_is_written_again_has_its_own_files_alone() {
+    let room = Room::new();
+    room.write("module.wasm", b"\0asm");
+    room.write("kept.txt", b"mine");
+    for name in ["a.gltf", "b.gltf"] {
+        room.write(name, b"{}");
+        assert!(
+            room.run(&["page", "site", "--module", "module.wasm", "--scene", name]).status == Some(0),
+            "{name}"
+        );
+        room.write("site/mine.txt", b"mine");
+    }
+    assert!(!room.path("site/scenes/a.gltf").exists() && room.path("site/scenes/b.gltf").is_file());
+    // A list that was changed names no file of others.
+    room.write("site/files.json", br#"["./", "../kept.txt", "/kept.txt", "scenes"]"#);
+    assert!(room.run(&["page", "site", "--module", "module.wasm"]).status == Some(0));
+    assert!(room.path("kept.txt").is_file() && room.path("site/mine.txt").is_file());
+}
