@@ -65,7 +65,7 @@ let pointed = null;
 const hasHost = document.querySelector("meta[name=host]").content === "page";
 const handlers = { message: take, tile: takeTile, changed: open => { isOpen = open; show(); } };
 const connection = hasHost
-    ? new LocalHost({ ...handlers, failed: reason => start.show(reason), said: line => console.info(line) })
+    ? new LocalHost({ ...handlers, failed: reason => start.show(reason), said: line => panel.notice(line) })
     : new Connection(`${location.protocol.replace("http", "ws")}//${location.host}/socket${location.search}`, handlers);
 const exposure = new Exposure(show);
 const overlay = new Overlay(picture, showLayer);
@@ -180,6 +180,7 @@ function open(files, words, shown) {
     zoom.fit();
     picture.clear();
     exposure.take(shown ?? {});
+    panel.forgetNotices();
     hush();
     show();
     // A link may state cards.

@@ -141,6 +141,20 @@ export class Panel {
             row("sent to cards", bytes(sent)));
     }
 
+    // Adds a line that a host in this page has printed, such as what it ignores of a scene.
+    notice(line) {
+        const notices = document.getElementById("notices"), list = notices.querySelector("ul");
+        list.append(element("li", { textContent: line.replace(/^photoncard: /, "") }));
+        notices.querySelector("summary").textContent = `${list.children.length} ${list.children.length === 1 ? "notice" : "notices"} about this scene`;
+        notices.hidden = false;
+    }
+
+    forgetNotices() {
+        const notices = document.getElementById("notices");
+        notices.querySelector("ul").replaceChildren();
+        notices.hidden = true;
+    }
+
     cards(cards) {
         document.getElementById("cards").replaceChildren(...cards.map(({ name, state, tiles, error }, index) => {
             // Tiles keep the number of their card, so that one that has gone keeps its place.

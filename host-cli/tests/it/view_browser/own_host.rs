@@ -10,7 +10,7 @@ use super::browser::{Browser, Scripted};
 use super::firefox::Firefox;
 use super::person::{Person, SETTLED};
 use super::server::{FileServer, run_shown};
-use crate::support::{Room, shipped, skip};
+use crate::support::{Room, scene, shipped, skip};
 
 /// Time limit of a picture: the host's work is on one core, and not optimised for this machine.
 const LIMIT: Duration = Duration::from_secs(150);
@@ -118,6 +118,26 @@ fn a_page_with_its_own_host_works_without_a_network() {
     server.end();
     open(&mut tab, &server, &line);
     tab.wait(SETTLED, LIMIT);
+}
+
+#[test]
+fn what_a_page_ignores_of_a_scene_is_told() {
+    let Some(mut browser) = Browser::start() else { return };
+    let room = Room::new();
+    let Some(server) = site(&room) else { return };
+    let mut tab = browser.tab([900, 600]);
+    tab.open(&server.address);
+    tab.wait("document.querySelectorAll('#start-scenes button').length === 2", LIMIT);
+    let mut scene = scene();
+    scene["extensionsUsed"].as_array_mut().unwrap().push("EXT_unknown".into());
+    tab.value(&format!("photoncard.start.take([['a.gltf', new File([{:?}], 'a.gltf')]])", scene.to_string()));
+    let notices = "document.getElementById('notices')";
+    tab.wait(&format!("!{notices}.hidden"), LIMIT);
+    let told = tab.value(&format!("{notices}.textContent"));
+    assert!(told.as_str().unwrap().contains("the extension EXT_unknown is ignored"), "{told}");
+    // Another scene has notices of its own.
+    tab.value("document.querySelector('#start-scenes button').click()");
+    tab.wait(&format!("{notices}.hidden"), LIMIT);
 }
 
 #[test]
