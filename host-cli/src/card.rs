@@ -141,7 +141,7 @@ fn port_row(port: &ListedPort) -> [String; 4] {
 
 /// Runs the self-test of a card and prints the results.
 pub(crate) fn self_test(address: &CardAddress, quiet: bool) -> Result<(), Failure> {
-    let progress = Progress::start(quiet, 1).map_err(|error| Failure::work_error(&error))?;
+    let progress = Progress::of_lines(quiet, 1)?;
     let result = card_self_test(address, &progress);
     progress.finish();
     let test = result.map_err(|error| match error {

@@ -12,11 +12,10 @@ use super::cards::CardOptions;
 use super::choice::choice;
 use super::farm::JobOptions;
 use super::files::file;
-use super::progress::ProgressForm;
+use super::host::HostOptions;
 use super::scene::SceneOptions;
 use super::schedule::ScheduleOptions;
 use super::sensors::SensorOptions;
-use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct BakeOptions {
@@ -43,15 +42,8 @@ pub(crate) struct BakeOptions {
     pub(crate) schedule: ScheduleOptions,
     #[command(flatten)]
     pub(crate) cards: CardOptions,
-    /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
-    /// Show no progress; contents of the scene that are ignored or missing are still reported
-    #[arg(long)]
-    pub(crate) quiet: bool,
-    /// Form in which progress and a failure are reported
-    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
-    pub(crate) progress: ProgressForm,
+    #[command(flatten)]
+    pub(crate) host: HostOptions,
 }
 
 /// Parses the path of a part. The option takes all words behind it, so that a scene there is a mistake.

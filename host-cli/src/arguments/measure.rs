@@ -9,12 +9,11 @@ use photoncard_driver::render::RenderSettings;
 use super::cards::CardOptions;
 use super::farm::JobOptions;
 use super::files::{TextOutput, text};
+use super::host::HostOptions;
 use super::picture::place;
-use super::progress::ProgressForm;
 use super::scene::SceneOptions;
 use super::schedule::ScheduleOptions;
 use super::sensors::SensorOptions;
-use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct MeasureOptions {
@@ -40,15 +39,8 @@ pub(crate) struct MeasureOptions {
     pub(crate) schedule: ScheduleOptions,
     #[command(flatten)]
     pub(crate) cards: CardOptions,
-    /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
-    /// Show no progress; contents of the scene that are ignored or missing are still reported
-    #[arg(long)]
-    pub(crate) quiet: bool,
-    /// Form in which progress and a failure are reported
-    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
-    pub(crate) progress: ProgressForm,
+    #[command(flatten)]
+    pub(crate) host: HostOptions,
 }
 
 #[derive(Args)]

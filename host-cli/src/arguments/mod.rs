@@ -7,6 +7,7 @@ mod choice;
 mod farm;
 mod files;
 mod frames;
+mod host;
 mod integrator;
 mod lights;
 #[cfg(feature = "study")]
@@ -57,6 +58,7 @@ use self::cards::{ChipOption, memory_size};
 pub(crate) use self::farm::{Engine, FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
 pub(crate) use self::frames::{FrameOptions, last_numbered, numbered};
+pub(crate) use self::host::HostOptions;
 pub(crate) use self::lights::LightOptions;
 pub(crate) use self::measure::{MeasureOptions, PointOptions, UnitOptions};
 pub(crate) use self::merge::MergeOptions;
@@ -101,10 +103,10 @@ impl Command {
     /// Returns the form in which the command reports progress and failure.
     pub(crate) fn progress(&self) -> ProgressForm {
         match self {
-            Self::Render(options) => options.progress,
-            Self::Prepare(options) => options.progress,
-            Self::Measure(options) => options.progress,
-            Self::Bake(options) => options.progress,
+            Self::Render(options) => options.host.progress,
+            Self::Prepare(options) => options.host.progress,
+            Self::Measure(options) => options.host.progress,
+            Self::Bake(options) => options.host.progress,
             Self::Merge(options) => options.progress,
             Self::View(options) => options.progress,
             _ => ProgressForm::Text,

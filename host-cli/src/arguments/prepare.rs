@@ -11,12 +11,11 @@ use super::cards::{ChipOption, MemoryOption};
 use super::choice::choice;
 use super::files::file;
 use super::frames::FrameOptions;
+use super::host::HostOptions;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
-use super::progress::ProgressForm;
 use super::scene::SceneOptions;
-use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct PrepareOptions {
@@ -50,15 +49,8 @@ pub(crate) struct PrepareOptions {
     card: ChipOption,
     #[command(flatten)]
     memory: MemoryOption,
-    /// Threads for the work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
-    /// Show no progress; contents of the scene that are ignored or missing are still reported
-    #[arg(long)]
-    pub(crate) quiet: bool,
-    /// Form in which progress and a failure are reported
-    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
-    pub(crate) progress: ProgressForm,
+    #[command(flatten)]
+    pub(crate) host: HostOptions,
 }
 
 impl PrepareOptions {

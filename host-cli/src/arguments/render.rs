@@ -17,16 +17,15 @@ use photoncard_driver::scene::Scene;
 use super::cards::CardOptions;
 use super::choice::choice;
 use super::frames::FrameOptions;
+use super::host::HostOptions;
 use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::prepared::PreparedOption;
-use super::progress::ProgressForm;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 use super::schedule::{PartOptions, ScheduleOptions};
-use super::threads::threads;
 
 #[derive(Args)]
 pub(crate) struct RenderOptions {
@@ -64,15 +63,8 @@ pub(crate) struct RenderOptions {
     pub(crate) cards: CardOptions,
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
-    /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
-    /// Show no progress; contents of the scene that are ignored or missing are still reported
-    #[arg(long)]
-    pub(crate) quiet: bool,
-    /// Form in which progress and a failure are reported
-    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
-    pub(crate) progress: ProgressForm,
+    #[command(flatten)]
+    pub(crate) host: HostOptions,
 }
 
 /// Settings of a render before its pilot render, which chooses the settings that are not stated.

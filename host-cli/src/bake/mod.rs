@@ -17,10 +17,9 @@ use crate::arguments::{BakeOptions, Engine};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::farm;
-use crate::notices::{self, Uses};
 use crate::picture_files::denoiser;
 use crate::progress::Progress;
-use crate::render::{assigned, dram_bytes, on_threads};
+use crate::render::{dram_bytes, on_threads, without_view};
 use crate::{input, outputs};
 
 /// Bakes lightmaps, or measures a part of them.
@@ -30,13 +29,9 @@ pub(crate) fn run(options: &BakeOptions) -> Result<(), Failure> {
     if let Some(engine) = options.job.farm {
         return job(options, engine);
     }
-    let scene = assigned(&options.scene, input::load_for_lightmaps(&options.scene, dram_bytes(&settings))?)?;
-    let settings = settings.with(|s| s.picture.light_groups = scene.light_groups.names().to_vec());
-    notices::say_ignored(&options.scene, &scene, &Uses::without_view(&options.scene))?;
-    if !options.quiet {
-        notices::say_remarks(&options.scene.path, &scene);
-    }
-    on_threads(options.threads, || bake(options, &scene, &settings))?
+    let scene = input::load_for_lightmaps(&options.scene, dram_bytes(&settings))?;
+    let (scene, settings) = without_view(&options.scene, &options.host, (scene, settings))?;
+    on_threads(options.host.threads, || bake(options, &scene, &settings))?
         .map_err(|failure| failure.stopped_as("stopped; no lightmap was written"))
 }
 
@@ -71,7 +66,7 @@ fn check(options: &BakeOptions, settings: &RenderSettings) -> Result<(), Failure
 fn bake(options: &BakeOptions, scene: &Scene, settings: &RenderSettings) -> Result<(), Failure> {
     let plan = Plan::new(scene, &options.bake()).map_err(failure)?;
     let whole = plan.whole(scene, settings);
-    if !options.quiet {
+    if !options.host.quiet {
         describe(options, &plan, &whole);
     }
     let files = Files::new(options, plan.atlas().pages)?;
@@ -93,7 +88,7 @@ fn denoised(options: &BakeOptions, mut pages: Vec<Page>) -> Result<Vec<Page>, Fa
     let Some(denoiser) = denoiser(options.files.denoise)? else { return Ok(pages) };
     for page in &mut pages {
         let values: Vec<[f32; 3]> = page.values.iter().map(Vec3::to_array).collect();
-        let values = denoiser.lightmap([page.size; 2], &values, options.threads, &|| false);
+        let values = denoiser.lightmap([page.size; 2], &values, options.host.threads, &|| false);
         page.values =
             values.map_err(|error| Failure::work_error(&error))?.into_iter().map(Vec3::from).collect();
     }
@@ -123,9 +118,7 @@ fn measured(
     (scene, settings): (&Scene, &RenderSettings),
     [first, end]: [u64; 2],
 ) -> Result<Vec<Light>, Failure> {
-    let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?
-        .in_form(options.progress, Phase::Tiles);
+    let progress = Progress::start(&options.host, settings.cards.count(), Phase::Tiles)?;
     let mut meter = Meter::new(scene, settings, [0.0; 3]);
     let points = plan.points();
     let own = points.get(first as usize..end as usize).unwrap_or_default();

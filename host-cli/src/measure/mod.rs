@@ -21,9 +21,8 @@ use self::table::{Photometry, Table};
 use crate::arguments::{Engine, MeasureOptions, PointOptions};
 use crate::failure::Failure;
 use crate::farm;
-use crate::notices::{self, Uses};
 use crate::progress::Progress;
-use crate::render::{assigned, dram_bytes, on_threads};
+use crate::render::{dram_bytes, on_threads, without_view};
 use crate::{input, outputs};
 
 /// Measures the points and writes the table.
@@ -33,22 +32,17 @@ pub(crate) fn run(options: &MeasureOptions) -> Result<(), Failure> {
     if let Some(engine) = options.job.farm {
         return job(options, engine);
     }
-    let scene = assigned(&options.scene, input::load(&options.scene, dram_bytes(&settings))?)?;
-    let settings = settings.with(|s| s.picture.light_groups = scene.light_groups.names().to_vec());
-    notices::say_ignored(&options.scene, &scene, &Uses::without_view(&options.scene))?;
-    if !options.quiet {
-        notices::say_remarks(&options.scene.path, &scene);
-    }
+    let scene = input::load(&options.scene, dram_bytes(&settings))?;
+    let (scene, settings) = without_view(&options.scene, &options.host, (scene, settings))?;
     let source = Source::open(&options.points, &scene)?;
     let photometry = Photometry::new(&options.units, &scene)?;
-    let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?
-        .in_form(options.progress, Phase::Tiles);
+    let progress = Progress::start(&options.host, settings.cards.count(), Phase::Tiles)?;
     let meter = Meter::new(&scene, &settings, photometry.weights);
-    let summary = on_threads(options.threads, || measure(options, source, meter, photometry, &progress))?
-        .map_err(|failure| failure.stopped_as("stopped; no table was written"))?;
+    let summary =
+        on_threads(options.host.threads, || measure(options, source, meter, photometry, &progress))?
+            .map_err(|failure| failure.stopped_as("stopped; no table was written"))?;
     progress.finish();
-    if !options.quiet {
+    if !options.host.quiet {
         summary.say(&photometry);
     }
     Ok(())

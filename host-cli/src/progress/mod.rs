@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use self::remaining::Remaining;
-use crate::arguments::ProgressForm;
+use crate::arguments::{HostOptions, ProgressForm};
 use crate::console::{is_json, print, say, say_json};
 use crate::failure::Failure;
 #[cfg(target_os = "linux")]
@@ -76,9 +76,30 @@ impl Form {
 const JSON_INTERVAL: Duration = Duration::from_millis(100);
 
 impl Progress {
-    /// Starts the display of work on `cards` cards; nothing is shown if `quiet`. The first signal stops the
-    /// work, the second one ends the process.
-    pub(crate) fn start(quiet: bool, cards: usize) -> std::io::Result<Self> {
+    /// Starts the display of work on `cards` cards. The first signal stops the work, the second one ends the
+    /// process. In the form of Open Job Description, only the percentage of `phase` is printed.
+    ///
+    /// # Errors
+    /// If signals cannot be handled.
+    pub(crate) fn start(host: &HostOptions, cards: usize, phase: Phase) -> Result<Self, Failure> {
+        Self::of_lines(host.quiet, cards).map(|progress| progress.in_form(host.progress, phase))
+    }
+
+    /// Starts the display for a sequence of frames, as [`Self::start`] does. Lines show nothing during a
+    /// frame.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(crate) fn of_frames(host: &HostOptions, cards: usize, phase: Phase) -> Result<Self, Failure> {
+        let is_quiet = host.quiet || Form::of_standard_error() == Form::Lines;
+        Self::of_lines(is_quiet, cards).map(|progress| progress.in_form(host.progress, phase))
+    }
+
+    /// Starts a display of lines or a bar; nothing is shown if `quiet`.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(crate) fn of_lines(quiet: bool, cards: usize) -> Result<Self, Failure> {
         let display = Display {
             phase: None,
             bar: ProgressBar::hidden(),
@@ -91,22 +112,16 @@ impl Progress {
             is_end_told: false,
         };
         let display = (!quiet).then_some(Mutex::new(display));
-        let (stopped, kept) = (stop_on_signals()?, AtomicBool::new(false));
+        let stopped = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
+        let kept = AtomicBool::new(false);
         Ok(Self { stopped, kept, failed: Mutex::default(), display, percent: None })
     }
 
-    /// Sets the form of the progress. In the form of Open Job Description, only the percentage of `phase` is
-    /// printed.
-    pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
+    fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
         match form {
             ProgressForm::Text | ProgressForm::Json => self,
             ProgressForm::Openjd => Self { display: None, percent: Some(Percent::of(phase)), ..self },
         }
-    }
-
-    /// Starts the display for a sequence of frames. Lines show nothing during a frame.
-    pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
-        Self::start(quiet || Form::of_standard_error() == Form::Lines, cards)
     }
 
     /// Starts the display of the next frame.

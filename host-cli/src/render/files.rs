@@ -21,7 +21,8 @@ use crate::picture_files::{Form, denoised, denoised_by, denoiser, write_picture}
 /// finished tiles of an earlier render is overwritten.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
-    let texts = [outputs.stats == Some(TextOutput::StandardOutput), options.progress == ProgressForm::Openjd];
+    let texts =
+        [outputs.stats == Some(TextOutput::StandardOutput), options.host.progress == ProgressForm::Openjd];
     check_standard_output(&outputs.pictures, outputs.pipes_tiles(), &texts)?;
     check_kept(options, outputs)?;
     let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
@@ -79,7 +80,7 @@ pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptio
     let numbers = options.frames.numbers().into_iter().flatten();
     let of_frames = numbers.filter_map(|number| numbered(path, number));
     crate::outputs::check_foreign(of_frames.chain((!has_frames).then(|| path.to_owned())))?;
-    if !options.quiet {
+    if !options.host.quiet {
         say(format_args!("photoncard: without -o the picture is written to {}", path.display()));
     }
     Ok(Some(outputs))
@@ -95,7 +96,7 @@ pub(super) fn write(
     let start = Instant::now();
     // If the denoiser fails, the picture is written without the denoised layer.
     let (denoised, failure) =
-        match denoised(denoiser, &rendering.film, options.picture.transparent, options.threads) {
+        match denoised(denoiser, &rendering.film, options.picture.transparent, options.host.threads) {
             Ok(denoised) => (denoised, None),
             Err(failure) => (None, Some(failure)),
         };

@@ -36,7 +36,7 @@ pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -
         sequence.render(number, &outputs, &mut settings)?;
     }
     sequence.progress.finish();
-    if !options.quiet {
+    if !options.host.quiet {
         messages::say_frames(count, start.elapsed().as_secs_f64());
     }
     Ok(())
@@ -74,9 +74,7 @@ impl<'a> Sequence<'a> {
         let start = Instant::now();
         let (moments, rest) = Moments::open(&options.scene, &options.frames, dram_bytes(settings))?;
         view(options, settings, &rest)?;
-        let progress = Progress::of_frames(options.quiet, settings.cards.count())
-            .map_err(|error| Failure::work_error(&error))?
-            .in_form(options.progress, Phase::Tiles);
+        let progress = Progress::of_frames(&options.host, settings.cards.count(), Phase::Tiles)?;
         Ok(Self {
             options,
             moments,
@@ -102,12 +100,12 @@ impl<'a> Sequence<'a> {
         let inputs = input::provenance(&self.options.scene);
         let inputs = inputs.into_iter().chain(self.options.frames.provenance(number)).collect();
         if finished::is_finished(self.options, outputs, settings, self.moments.scene(), &inputs) {
-            if !self.options.quiet {
+            if !self.options.host.quiet {
                 messages::say_finished(outputs, number);
             }
             return Ok(());
         }
-        let result = on_threads(self.options.threads, || self.picture(settings))?;
+        let result = on_threads(self.options.host.threads, || self.picture(settings))?;
         self.progress.finish();
         let result = result.inspect_err(|error| end_early(error, &self.progress, outputs));
         let (rendering, fit) = result.map_err(|error| match error {
@@ -130,7 +128,7 @@ impl<'a> Sequence<'a> {
     fn settle(&mut self, settings: &mut RenderSettings) -> Result<(), Failure> {
         let Self { options, rest, progress, .. } = self;
         let Some(rest) = rest.take() else { return Ok(()) };
-        let (photons, integrator) = on_threads(options.threads, || {
+        let (photons, integrator) = on_threads(options.host.threads, || {
             let unfitted = options.unfitted(settings)?;
             let fit = options.fit(&rest, &PackedScene::new(&rest)?, &unfitted, progress)?;
             Ok::<_, RenderError>(chosen(options, unfitted, fit.as_ref(), progress))

@@ -32,12 +32,12 @@ pub(super) fn say_loaded(
     misfit: Option<String>,
 ) -> Result<(), Failure> {
     let path = &options.scene.path;
-    if !options.quiet {
+    if !options.host.quiet {
         say(format_args!("photoncard: {}", loaded(path, &settings.picture, scene, camera)));
     }
     let uses = Uses::of(&options.scene, &settings.picture, Some(&options.frames));
     notices::say_ignored(&options.scene, scene, &uses)?;
-    if options.quiet {
+    if options.host.quiet {
         return Ok(());
     }
     notices::say_remarks(path, scene);

@@ -24,9 +24,8 @@ use photoncard_driver::scene::Scene;
 
 use self::darkness::Circumstances;
 use self::end::{End, at_once};
-pub(crate) use self::steps::on_threads;
-use self::steps::{Finished, chosen, end_early, finish, view};
-pub(crate) use self::steps::{assigned, dram_bytes};
+use self::steps::{Finished, assigned, chosen, end_early, finish, view};
+pub(crate) use self::steps::{dram_bytes, on_threads, without_view};
 use crate::arguments::RenderOptions;
 use crate::failure::Failure;
 use crate::input;
@@ -55,16 +54,14 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let scene = read_scene(options, &mut settings)?;
     let circumstances = Circumstances::of(&scene, &settings.camera(&scene)?);
     let scene_seconds = start.elapsed().as_secs_f64();
-    let progress = Progress::start(options.quiet, settings.cards.count())
-        .map_err(|error| Failure::work_error(&error))?
-        .in_form(options.progress, Phase::Tiles);
+    let progress = Progress::start(&options.host, settings.cards.count(), Phase::Tiles)?;
     let found = OnceLock::new();
     let choose = |packed: &PackedScene| {
         let unfitted = options.unfitted(&settings)?;
         let fit = options.fit(&scene, packed, &unfitted, &progress)?;
         Ok(chosen(options, unfitted, found.get_or_init(|| fit).as_ref(), &progress))
     };
-    let result = on_threads(options.threads, || {
+    let result = on_threads(options.host.threads, || {
         let Some(aim) = options.samples.aim() else {
             return Ok((render_chosen(&scene, &settings, &choose, &progress)?, None));
         };
@@ -82,7 +79,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None, circumstances };
     finish(options, &options.outputs, finished)?;
     let Some(end) = end else { return Ok(()) };
-    if !options.quiet {
+    if !options.host.quiet {
         end.say(&at_once);
     }
     match end.ending {

@@ -99,12 +99,10 @@ impl<'a> Preparation<'a> {
         options.picture.fit(&camera, &mut settings.picture);
         let uses = Uses::of(&options.scene, &settings.picture, Some(&options.frames));
         notices::say_ignored(&options.scene, scene, &uses)?;
-        if !options.quiet {
+        if !options.host.quiet {
             notices::say_remarks(&options.scene.path, scene);
         }
-        let progress = Progress::start(options.quiet, 1)
-            .map_err(|error| Failure::work_error(&error))?
-            .in_form(options.progress, Phase::Photons);
+        let progress = Progress::start(&options.host, 1, Phase::Photons)?;
         Ok(Self { options, settings, progress, said: OnceLock::new() })
     }
 
@@ -134,7 +132,7 @@ impl<'a> Preparation<'a> {
     ) -> Result<PreparedScene, Failure> {
         let Self { options, settings, progress, .. } = self;
         let (budgets, notes) = ([options.budget()], notes(options));
-        let prepared = on_threads(options.threads, || {
+        let prepared = on_threads(options.host.threads, || {
             PreparedScene::new(scene, settings, &budgets, &choose, notes, progress)
         })?;
         progress.finish();
@@ -143,7 +141,7 @@ impl<'a> Preparation<'a> {
 
     fn write(&self, prepared: &PreparedScene, path: &Path) -> Result<(), Failure> {
         prepared.write(path).map_err(Failure::work)?;
-        if !self.options.quiet {
+        if !self.options.host.quiet {
             self.said.get().iter().for_each(|chosen| say(format_args!("photoncard: {chosen}")));
             let (path, bytes) = (path.display(), prepared.image_bytes());
             let frames = match prepared.frames().count() {

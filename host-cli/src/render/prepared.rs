@@ -32,10 +32,11 @@ pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
         }
     };
     let count = options.settings().cards.count();
-    let progress =
-        if outputs.len() > 1 { Progress::of_frames } else { Progress::start }(options.quiet, count)
-            .map_err(|error| Failure::work_error(&error))?
-            .in_form(options.progress, Phase::Tiles);
+    let progress = if outputs.len() > 1 { Progress::of_frames } else { Progress::start }(
+        &options.host,
+        count,
+        Phase::Tiles,
+    )?;
     let (start, pictures) = (Instant::now(), outputs.len());
     let mut last: Option<OpenScene> = None;
     for (frame, outputs) in outputs {
@@ -46,7 +47,7 @@ pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
         };
         scene.render(options, frame, &outputs, &progress)?;
     }
-    if pictures > 1 && !options.quiet {
+    if pictures > 1 && !options.host.quiet {
         messages::say_frames(pictures, start.elapsed().as_secs_f64());
     }
     Ok(())
@@ -121,7 +122,7 @@ impl OpenScene {
         let camera = settings.camera(scene)?;
         let misfit = options.picture.fit(&camera, &mut settings.picture);
         let mut inputs = inputs.clone();
-        if !options.quiet && *seconds > 0.0 {
+        if !options.host.quiet && *seconds > 0.0 {
             messages::say_prepared(path, &settings, &inputs, &camera);
             misfit.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
             if options.parts.part.is_none() {
@@ -130,13 +131,13 @@ impl OpenScene {
         }
         inputs.extend(frame.map(|frame| ("frame".to_owned(), json!(frame))));
         if let Some(frame) = frame.filter(|_| is_finished(options, outputs, &settings, scene, &inputs)) {
-            if !options.quiet {
+            if !options.host.quiet {
                 messages::say_finished(outputs, frame);
             }
             return Ok(());
         }
         progress.begin_frame();
-        let result = on_threads(options.threads, || renderer.render(scene, &settings, progress))?;
+        let result = on_threads(options.host.threads, || renderer.render(scene, &settings, progress))?;
         progress.finish();
         let result = result.inspect_err(|error| end_early(error, progress, outputs));
         let rendering = result.map_err(|error| match (frame, error) {

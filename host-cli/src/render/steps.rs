@@ -10,10 +10,11 @@ use serde_json::json;
 
 use super::darkness::{Circumstances, say_dark};
 use super::{files, messages};
-use crate::arguments::{OutputOptions, RenderOptions, SceneOptions, Unfitted};
+use crate::arguments::{HostOptions, OutputOptions, RenderOptions, SceneOptions, Unfitted};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::flags::with_flags;
+use crate::notices::{self, Uses};
 use crate::progress::Progress;
 
 /// Prints where the finished tiles of a failed render are kept, and writes its statistics so far.
@@ -60,13 +61,13 @@ pub(super) fn finish(
     let provenance = &mut rendering.statistics.provenance;
     provenance.pixels.extend(inputs);
     provenance.work.insert("quality".to_owned(), json!(quality.name()));
-    provenance.work.insert("threads".to_owned(), json!(options.threads));
+    provenance.work.insert("threads".to_owned(), json!(options.host.threads));
     provenance.work.insert("pilot".to_owned(), json!(fit.map(|fit| fit.measured)));
     files::write(options, outputs, &mut rendering)?;
     if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
         partial.remove().map_err(Failure::work)?;
     }
-    if !options.quiet {
+    if !options.host.quiet {
         messages::say_done(outputs, &rendering, frame);
     }
     messages::say_sparse(&rendering.statistics);
@@ -89,7 +90,7 @@ pub(super) fn chosen(
     if let Some(fit) = fit {
         fit.apply(&mut settings, stated);
     }
-    if !options.quiet && (fit.is_some() || are_kept) {
+    if !options.host.quiet && (fit.is_some() || are_kept) {
         let by = if are_kept { "kept samples".to_owned() } else { messages::by_quality(options.quality) };
         let are_planned = options.samples.aim().is_some();
         progress.say(format_args!("photoncard: {by}: {}", messages::chosen(&settings, are_planned)));
@@ -113,6 +114,22 @@ pub(crate) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene
     scene.set_light_groups(&options.light_groups).map_err(Failure::input)?;
     scene.check_light().map_err(Failure::input)?;
     Ok(scene)
+}
+
+/// Prepares a loaded scene and the settings for work without a view: applies the options, and says what is
+/// ignored.
+pub(crate) fn without_view(
+    options: &SceneOptions,
+    host: &HostOptions,
+    (scene, settings): (Scene, RenderSettings),
+) -> Result<(Scene, RenderSettings), Failure> {
+    let scene = assigned(options, scene)?;
+    let settings = settings.with(|s| s.picture.light_groups = scene.light_groups.names().to_vec());
+    notices::say_ignored(options, &scene, &Uses::without_view(options))?;
+    if !host.quiet {
+        notices::say_remarks(&options.path, &scene);
+    }
+    Ok((scene, settings))
 }
 
 /// Gives a picture the scene's light groups and, without a stated size, the camera's aspect ratio, and prints

@@ -123,7 +123,7 @@ impl Video {
             return Err(Failure::Work(Report::new(MietteDiagnostic::new(text).with_help(help))));
         }
         std::fs::rename(&made, &self.path).map_err(failed)?;
-        if !options.quiet {
+        if !options.host.quiet {
             let count = pictures.len();
             say(format_args!("photoncard: {}: {count} frames, by ffmpeg", self.path.display()));
         }
