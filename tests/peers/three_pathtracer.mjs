@@ -55,8 +55,8 @@ async function serve(find) {
     const server = createServer(({ url }, answer) => {
         const path = decodeURIComponent(url.split("?")[0]);
         try {
-            const file = find(path === "/" ? "/index.html" : path);
-            answer.writeHead(200, { "Content-Type": KINDS[file.split(".").pop()] ?? "application/octet-stream" }).end(readFileSync(file));
+            const file = find(path === "/" ? "/index.html" : path), bytes = readFileSync(file);
+            answer.writeHead(200, { "Content-Type": KINDS[file.split(".").pop()] ?? "application/octet-stream" }).end(bytes);
         } catch {
             answer.writeHead(404).end();
         }
@@ -133,12 +133,12 @@ async function three(variant, site) {
     const tab = await Tab.open({ flags: variant.startsWith("webgpu") ? WEBGPU : [] });
     await tab.go(`${site.address}?variant=${variant}&size=${size[0]}&seconds=${options.seconds}`);
     const isEnded = await tab.until("window.peer?.ended", Number(options.seconds) + LIMIT);
-    const { error, loaded, compiled, device } = await tab.value("({ ...peer, taken: null })");
+    const { error, loaded, compiled, drawn, device } = await tab.value("({ ...peer, taken: null })");
     if (error || !isEnded) console.error(`three-gpu-pathtracer, ${variant}: ${error ?? "does not end"}`);
     writeFileSync(join(folder, `three-${variant}-page.png`), await tab.screenshot());
     const pictures = await points(tab, values => turned(...size, values));
     await tab.close();
-    return { name: `three ${variant}`, device, loaded: loaded / 1000, compiled: compiled / 1000, pictures };
+    return { name: `three ${variant}`, device, loaded: loaded / 1000, compiled: compiled / 1000, drawn: drawn / 1000, pictures };
 }
 
 const percent = share => (100 * share).toFixed(2);
@@ -195,8 +195,8 @@ for (const { name, shown, first, pictures } of own) {
     const whole = pictures.find(({ step }) => step === 1);
     console.log(`${name}: first tile ${first.toFixed(1)} s, first whole picture of all pixels ${whole?.seconds.toFixed(1)} s; ${shown}`);
 }
-for (const { name, device, loaded, compiled } of peers) {
-    console.log(`${name}: ${device}; scene loaded ${loaded.toFixed(1)} s, first sample drawn ${compiled.toFixed(1)} s`);
+for (const { name, device, loaded, compiled, drawn } of peers) {
+    console.log(`${name}: ${device}; scene loaded ${loaded.toFixed(1)} s, shader compiled ${compiled.toFixed(1)} s, first sample drawn ${drawn.toFixed(1)} s`);
 }
 console.log();
 printPoints([...own, ...peers]);

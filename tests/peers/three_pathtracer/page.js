@@ -18,7 +18,7 @@ const hasLight = !["loaded", "lambertian"].includes(variant);
 // Distance of the light from the lamp's mesh, which would hide it.
 const GAP = 0.001;
 
-const peer = window.peer = { taken: [], ended: false, error: null, loaded: 0, compiled: 0, device: "" };
+const peer = window.peer = { taken: [], ended: false, error: null, loaded: 0, compiled: 0, drawn: 0, device: "" };
 
 // A rectangle of the lamp's extent and radiance that shines downwards: lamps of other forms are not known here.
 function addLight(scene, lamp) {
@@ -55,7 +55,10 @@ async function render(tracer) {
     let samples = 0;
     for (let due = 1; performance.now() < 1000 * seconds;) {
         samples = await tracer.step();
-        if (samples > 0) peer.compiled ||= performance.now();
+        if (samples > 0) {
+            peer.compiled ||= tracer.compiled;
+            peer.drawn ||= performance.now();
+        }
         if (samples >= due) {
             await take(samples);
             while (due <= samples) due *= 2;

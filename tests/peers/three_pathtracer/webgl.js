@@ -57,10 +57,15 @@ export async function open(canvas, size, variant, { scene, camera }) {
     };
     return {
         device: deviceOf(renderer.getContext()),
+        // When the browser had compiled the shader; SwiftShader does so once more for the first drawing.
+        compiled: 0,
         // Draws the tiles of one sample, waits for them, and returns the samples that all pixels have: 0 while the shader is compiled.
         async step() {
             do tracer.renderSample(); while (!Number.isInteger(tracer.samples));
-            if (tracer.samples > 0) read(1, 1);
+            if (tracer.samples > 0) {
+                this.compiled ||= performance.now();
+                read(1, 1);
+            }
             return tracer.samples;
         },
         // Rows are from the bottom.
