@@ -4,11 +4,13 @@
 // usage: node --experimental-websocket tests/peers/page.mjs PHOTONCARD SITE [SCENE ...]
 // SITE is a folder by `photoncard page`; a SCENE is one of it, such as scenes/cornell.gltf. It takes Chromium and a machine without other work.
 
-import { spawn, spawnSync } from "node:child_process";
+import { spawnSync } from "node:child_process";
 import { createServer } from "node:http";
-import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+
+import { Tab } from "./chromium.mjs";
 
 const [program, site, ...stated] = process.argv.slice(2);
 if (!site) {
@@ -17,7 +19,8 @@ if (!site) {
 }
 const scenes = stated.length > 0 ? stated : JSON.parse(readFileSync(join(site, "scenes.json"))).map(({ file }) => file);
 const KINDS = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm", svg: "image/svg+xml" };
-const TICKS = 100;
+// Seconds until a picture is given up.
+const LIMIT = 600;
 
 const server = createServer(({ url }, answer) => {
     const path = decodeURIComponent(url.split("?")[0]);
@@ -32,65 +35,16 @@ const server = createServer(({ url }, answer) => {
 await new Promise(act => server.once("listening", act));
 const address = `http://127.0.0.1:${server.address().port}/`;
 
-// CPU seconds of a process and all below it, those that have ended included.
-function cpu(root) {
-    const processes = readdirSync("/proc").filter(name => /^\d+$/.test(name)).flatMap(id => {
-        try {
-            const fields = readFileSync(`/proc/${id}/stat`, "latin1").split(") ")[1].split(" ");
-            return [{ id: Number(id), parent: Number(fields[1]), ticks: [11, 12, 13, 14].reduce((sum, at) => sum + Number(fields[at]), 0) }];
-        } catch {
-            return [];
-        }
-    });
-    const below = new Set([root]);
-    for (let before = 0; before !== below.size;) {
-        before = below.size;
-        for (const { id, parent } of processes) if (below.has(parent)) below.add(id);
-    }
-    return processes.filter(({ id }) => below.has(id)).reduce((sum, { ticks }) => sum + ticks, 0) / TICKS;
-}
-
 async function browse(command) {
-    const profile = mkdtempSync(join(tmpdir(), "page-"));
-    const chromium = spawn("chromium", ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader", "--remote-debugging-port=0", `--user-data-dir=${profile}`, "about:blank"], { stdio: ["ignore", "ignore", "pipe"] });
-    const root = await new Promise(act => {
-        let said = "";
-        chromium.stderr.on("data", more => {
-            const found = /DevTools listening on (\S+)/.exec(said += more);
-            if (found) act(found[1]);
-        });
-    });
-    const connect = async url => {
-        const socket = new WebSocket(url), waiting = new Map();
-        let number = 0;
-        socket.onmessage = ({ data }) => {
-            const { id, result } = JSON.parse(data);
-            waiting.get(id)?.(result);
-        };
-        await new Promise(act => socket.onopen = act);
-        return (method, params = {}) => new Promise(act => {
-            waiting.set(++number, act);
-            socket.send(JSON.stringify({ id: number, method, params }));
-        });
-    };
-    const browser = await connect(root);
-    const { targetId } = await browser("Target.createTarget", { url: "about:blank", newWindow: true });
-    const call = await connect(`${root.split("/devtools/")[0]}/devtools/page/${targetId}`);
-    const value = async expression => (await call("Runtime.evaluate", { expression, returnByValue: true })).result?.value;
-    const begun = performance.now(), before = cpu(chromium.pid);
-    await call("Page.navigate", { url: `${address}#${encodeURIComponent(command)}` });
-    let first = 0;
-    while (!await value("Boolean(window.photoncard?.isSettled)")) {
-        if (first === 0 && await value("window.photoncard?.picture?.isWhole")) first = performance.now() - begun;
-        await new Promise(act => setTimeout(act, 50));
-    }
-    const settled = performance.now() - begun;
-    const found = { first: first / 1000, settled: settled / 1000, cpu: cpu(chromium.pid) - before, command: await value("document.getElementById('command').textContent") };
-    chromium.kill();
-    await new Promise(act => chromium.once("exit", act));
-    rmSync(profile, { recursive: true, force: true, maxRetries: 50 });
-    return found;
+    const tab = await Tab.open(), begun = Date.now();
+    await tab.go(`${address}#${encodeURIComponent(command)}`);
+    if (!await tab.until("window.photoncard?.picture?.isWhole", LIMIT)) throw new Error(`no picture of ${command}`);
+    const first = Date.now();
+    if (!await tab.until("window.photoncard.isSettled", LIMIT)) throw new Error(`${command} does not settle`);
+    const settled = Date.now(), cpu = tab.cpuBetween(begun, settled);
+    const shown = await tab.value("document.getElementById('command').textContent");
+    await tab.close();
+    return { first: (first - begun) / 1000, settled: (settled - begun) / 1000, cpu, command: shown };
 }
 
 function native(command, cards) {

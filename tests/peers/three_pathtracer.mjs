@@ -1,10 +1,11 @@
 // The Cornell box by a page of `photoncard page` and by three-gpu-pathtracer, both in headless Chromium that renders in software: errors against
 // the path-traced reference over seconds and CPU seconds, and what equal errors take.
 //
-// usage: node --experimental-websocket tests/peers/three_pathtracer.mjs PHOTONCARD MODULE FOLDER [--seconds 90] [--cards 2] [--qualities draft,good]
-//        [--variants area-light,lambertian,loaded]
-// MODULE is the WebAssembly module of the page. First: `npm install three three-gpu-pathtracer three-mesh-bvh xatlas-web` in FOLDER, which also takes
-// the pictures. It takes a machine without other work. Seconds count from the navigation to the page; CPU seconds are those of all processes of Chromium.
+// usage: node --experimental-websocket tests/peers/three_pathtracer.mjs PHOTONCARD MODULE FOLDER [--seconds 130] [--cards 2] [--qualities draft,good]
+//        [--variants area-light,lambertian,loaded,webgpu]
+// MODULE is the WebAssembly module of the page, and Chromium that of $CHROMIUM or of the path. First: `npm install three three-gpu-pathtracer
+// three-mesh-bvh xatlas-web` in FOLDER, which also takes the pictures. It takes a machine without other work.
+// Seconds count from the navigation to the page; CPU seconds are those of all processes of Chromium.
 
 import { execFileSync } from "node:child_process";
 import { createServer } from "node:http";
@@ -12,14 +13,14 @@ import { mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
-import { Tab } from "./three_pathtracer/chromium.mjs";
+import { Tab } from "./chromium.mjs";
 import { Reference, png, reached } from "./three_pathtracer/errors.mjs";
 
 const { values: options, positionals } = parseArgs({
     allowPositionals: true,
     options: {
-        seconds: { type: "string", default: "90" }, cards: { type: "string", default: "2" }, qualities: { type: "string", default: "draft,good" },
-        variants: { type: "string", default: "area-light,lambertian,loaded" },
+        seconds: { type: "string", default: "130" }, cards: { type: "string", default: "2" }, qualities: { type: "string", default: "draft,good" },
+        variants: { type: "string", default: "area-light,lambertian,loaded,webgpu" },
     },
 });
 const [program, wasm, stated] = positionals;
@@ -130,7 +131,7 @@ async function photoncard(quality, site) {
 }
 
 async function three(variant, site) {
-    const tab = await Tab.open({ flags: variant.startsWith("webgpu") ? WEBGPU : [] });
+    const tab = await Tab.open({ flags: variant === "webgpu" ? WEBGPU : [] });
     await tab.go(`${site.address}?variant=${variant}&size=${size[0]}&seconds=${options.seconds}`);
     const isEnded = await tab.until("window.peer?.ended", Number(options.seconds) + LIMIT);
     const { error, loaded, compiled, drawn, device } = await tab.value("({ ...peer, taken: null })");
@@ -186,7 +187,10 @@ mkdirSync(folder, { recursive: true });
 rmSync(join(folder, "site"), { recursive: true, force: true });
 execFileSync(resolve(program), ["page", join(folder, "site"), "--scene", SCENE, "--module", resolve(wasm)], { stdio: "inherit" });
 const ownSite = await serve(path => join(folder, "site", path));
-const peerSite = await serve(path => path === "/scene.gltf" ? SCENE : path.startsWith("/node_modules/") ? join(folder, path) : join(HERE, "three_pathtracer", path));
+const peerSite = await serve(path => {
+    if (path === "/scene.gltf") return SCENE;
+    return path.startsWith("/node_modules/") ? join(folder, path) : join(HERE, "three_pathtracer", path);
+});
 const own = [], peers = [];
 for (const quality of options.qualities.split(",").filter(Boolean)) own.push(await photoncard(quality, ownSite));
 for (const variant of options.variants.split(",").filter(Boolean)) peers.push(await three(variant, peerSite));
@@ -196,7 +200,8 @@ for (const { name, shown, first, pictures } of own) {
     console.log(`${name}: first tile ${first.toFixed(1)} s, first whole picture of all pixels ${whole?.seconds.toFixed(1)} s; ${shown}`);
 }
 for (const { name, device, loaded, compiled, drawn } of peers) {
-    console.log(`${name}: ${device}; scene loaded ${loaded.toFixed(1)} s, shader compiled ${compiled.toFixed(1)} s, first sample drawn ${drawn.toFixed(1)} s`);
+    const seconds = [loaded, compiled, drawn].map(time => time.toFixed(1));
+    console.log(`${name}: ${device}; scene loaded ${seconds[0]} s, shader translated ${seconds[1]} s, first sample drawn ${seconds[2]} s`);
 }
 console.log();
 printPoints([...own, ...peers]);

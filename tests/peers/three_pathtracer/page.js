@@ -5,7 +5,7 @@
 // - loaded: the scene as three's loader gives it, and the path tracer's own settings;
 // - lambertian: surfaces without gloss and a box filter, as in the reference, by changes of the shader; paths have at most 32 surfaces;
 // - area-light: as `lambertian`, and a light that rays are sent to in place of the lamp's emission, which paths meet by chance;
-// - webgpu, webgpu-wavefront: as `area-light`, by the package's two path tracers for WebGPU, without changes of a shader.
+// - webgpu: a light in place of the lamp's emission, by the package's path tracer for WebGPU, without changes of a shader.
 //
 // `peer` has the state for whoever drives the page; times are milliseconds since the page was navigated to.
 
@@ -69,7 +69,7 @@ async function render(tracer) {
 }
 
 async function main() {
-    const { open } = await import(variant.startsWith("webgpu") ? "./webgpu.js" : "./webgl.js");
+    const { open } = await import(variant === "webgpu" ? "./webgpu.js" : "./webgl.js");
     const tracer = await open(document.getElementById("canvas"), size, variant, await load());
     peer.device = tracer.device;
     peer.loaded = performance.now();

@@ -93,9 +93,13 @@ export class Tab {
         });
         const browser = await connect(root);
         const { targetId } = await browser("Target.createTarget", { url: "about:blank", newWindow: true });
+        // Each complaint is told once.
+        const told = new Set();
         this.#call = await connect(`${root.split("/devtools/")[0]}/devtools/page/${targetId}`, message => {
             const complaint = heard(message);
-            if (complaint) console.error(`page: ${complaint}`);
+            if (!complaint || told.has(complaint)) return;
+            told.add(complaint);
+            console.error(`page: ${complaint}`);
         });
         await this.#call("Page.enable");
         await this.#call("Runtime.enable");
