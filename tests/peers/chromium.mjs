@@ -167,6 +167,6 @@ export class Tab {
         clearInterval(this.#timer);
         this.#process.kill();
         await new Promise(act => this.#process.once("exit", act));
-        rmSync(this.#profile, { recursive: true, force: true, maxRetries: 50 });
+        rmSync(this.#profile, { recursive: true, force: true, maxRetries: 50, retryDelay: 100 });
     }
 }
