@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use data_encoding::BASE64;
 
-use super::browser::{Browser, Scripted};
+use super::browser::{Browser, Scripted, Tab};
 use super::firefox::Firefox;
 use super::person::{Person, SETTLED};
 use super::server::{FileServer, run_shown};
@@ -39,6 +39,14 @@ fn site(room: &Room) -> Option<FileServer> {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Some(FileServer::start(room.path("site")))
+}
+
+/// Opens the page, which shows its scenes to choose.
+fn start(browser: &mut Browser, server: &FileServer) -> Tab {
+    let mut tab = browser.tab([900, 600]);
+    tab.open(&server.address);
+    tab.wait("document.querySelectorAll('#start-scenes button').length === 2", LIMIT);
+    tab
 }
 
 /// Opens the picture of a command line by the page's address.
@@ -125,9 +133,7 @@ fn what_a_page_ignores_of_a_scene_is_told() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let Some(server) = site(&room) else { return };
-    let mut tab = browser.tab([900, 600]);
-    tab.open(&server.address);
-    tab.wait("document.querySelectorAll('#start-scenes button').length === 2", LIMIT);
+    let mut tab = start(&mut browser, &server);
     let mut scene = scene();
     scene["extensionsUsed"].as_array_mut().unwrap().push("EXT_unknown".into());
     tab.value(&format!("photoncard.start.take([['a.gltf', new File([{:?}], 'a.gltf')]])", scene.to_string()));
@@ -145,9 +151,7 @@ fn faults_end_in_a_sentence_and_the_page_goes_on() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let Some(server) = site(&room) else { return };
-    let mut tab = browser.tab([900, 600]);
-    tab.open(&server.address);
-    tab.wait("document.querySelectorAll('#start-scenes button').length === 2", LIMIT);
+    let mut tab = start(&mut browser, &server);
     let reason = "document.getElementById('start-reason').textContent.toLowerCase()";
     for (name, text, expected) in [
         ("broken.glb", "no glTF at all", "broken.glb"),
