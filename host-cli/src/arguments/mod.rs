@@ -108,7 +108,7 @@ impl Command {
             Self::Measure(options) => options.host.progress,
             Self::Bake(options) => options.host.progress,
             Self::Merge(options) => options.progress,
-            Self::View(options) => options.progress,
+            Self::View(options) => options.host.progress,
             _ => ProgressForm::Text,
         }
     }

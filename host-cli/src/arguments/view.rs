@@ -10,15 +10,18 @@ use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
 use super::choice::choice;
+use super::host::HostOptions;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
-use super::progress::ProgressForm;
 use super::scene::SceneOptions;
 use super::schedule::ScheduleOptions;
-use super::threads::threads;
 
 #[derive(Args)]
+#[command(
+    mut_arg("quiet", |option| option.help("Print nothing but the page's address")),
+    mut_arg("progress", |option| option.help("Form in which notices and a failure are reported"))
+)]
 pub(crate) struct ViewOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
@@ -67,15 +70,8 @@ pub(crate) struct ViewOptions {
     schedule: ScheduleOptions,
     #[command(flatten)]
     pub(crate) cards: CardOptions,
-    /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
-    pub(crate) threads: Option<usize>,
-    /// Print nothing but the page's address
-    #[arg(long)]
-    pub(crate) quiet: bool,
-    /// Form in which notices and a failure are reported
-    #[arg(long, value_enum, default_value_t, hide_short_help = true)]
-    pub(crate) progress: ProgressForm,
+    #[command(flatten)]
+    pub(crate) host: HostOptions,
 }
 
 impl ViewOptions {

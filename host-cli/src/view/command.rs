@@ -50,7 +50,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     std::thread::scope(|scope| {
         scope.spawn(|| look_for_cards(&hub));
         let painter = Painter::new(hub.clone(), (scene, dram_bytes), options, denoiser, Renderer::default());
-        let painted = scope.spawn(|| on_threads(options.threads, || completed(painter.run())));
+        let painted = scope.spawn(|| on_threads(options.host.threads, || completed(painter.run())));
         while !hub.is_over() {
             std::thread::sleep(ATTENTION);
         }

@@ -90,7 +90,7 @@ fn load(options: &ViewOptions, dram_bytes: u64, settings: &mut RenderSettings) -
     let camera = settings.camera(&scene)?;
     notices::say_ignored(&options.scene, &scene, &Uses::of(&options.scene, &settings.picture, None))?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);
-    if let Some(notice) = misfit.filter(|_| !options.quiet) {
+    if let Some(notice) = misfit.filter(|_| !options.host.quiet) {
         say(format_args!("photoncard: {notice}"));
     }
     Ok(scene)

@@ -54,7 +54,7 @@ impl Painter {
         denoiser: Option<&'static Denoiser>,
         renderer: Renderer,
     ) -> Self {
-        let ViewOptions { scene: scene_options, quality, threads, .. } = options;
+        let ViewOptions { scene: scene_options, quality, host, .. } = options;
         Self {
             hub,
             options: scene_options.clone(),
@@ -62,7 +62,7 @@ impl Painter {
             quality: *quality,
             finish: options.finish(),
             denoiser,
-            threads: *threads,
+            threads: host.threads,
             renderer,
             scene: Arc::new(scene),
             fitting: None,
