@@ -97,10 +97,9 @@ impl OpenCard {
 
     /// Closes the link to a remote card and opens it again. Returns whether it is open.
     pub(super) fn reach_again(&mut self) -> bool {
-        let reached = self.close().and_then(|address| reach(&address).ok());
-        let is_open = reached.is_some();
-        reached.into_iter().for_each(|port| self.go_on_with(port));
-        is_open
+        let Some(port) = self.close().and_then(|address| reach(&address).ok()) else { return false };
+        self.go_on_with(port);
+        true
     }
 
     /// Takes the handle through which an emulated card with empty memory can get a card image by reference.

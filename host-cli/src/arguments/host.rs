@@ -3,7 +3,9 @@
 use clap::Args;
 
 use super::progress::ProgressForm;
-use super::threads::threads;
+
+/// Maximum number of threads. Without a limit, a number that the system cannot start would end the process.
+const MAX_THREADS: usize = 1024;
 
 #[derive(Args)]
 pub(crate) struct HostOptions {
@@ -16,4 +18,11 @@ pub(crate) struct HostOptions {
     /// Form in which progress and a failure are reported
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,
+}
+
+/// Parses a number of threads.
+pub(super) fn threads(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| (1..=MAX_THREADS).contains(count));
+    count
+        .ok_or_else(|| format!("use 1 to {MAX_THREADS} threads, or leave the option out for a thread a core"))
 }

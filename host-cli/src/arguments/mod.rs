@@ -34,7 +34,6 @@ mod study_output;
 mod suggestions;
 #[cfg(feature = "study")]
 mod sweep;
-mod threads;
 mod tone;
 mod tonemap;
 mod view;

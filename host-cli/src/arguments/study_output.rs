@@ -6,7 +6,7 @@ use clap::Args;
 use photoncard_driver::parts::Part;
 use photoncard_driver::study::SampleRate;
 
-use super::threads::threads;
+use super::host::threads;
 
 /// Folder of a study's output, and options that limit its work.
 #[derive(Args)]

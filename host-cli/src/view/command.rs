@@ -61,7 +61,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     Err(Failure::Stopped("stopped; the view is over"))
 }
 
-/// Prepares what browsers need to lend cards: the module, and a chip as that of the first emulated card.
+/// Reads the module of lent cards, and gives them the chip of the first emulated card.
 fn lending(options: &ViewOptions) -> Result<Lending, Failure> {
     let settings = options.settings();
     if settings.modelled_caches().is_some() {

@@ -27,7 +27,7 @@ const MAX_PAUSE: Duration = Duration::from_secs(30);
 /// Bytes of a message to a card.
 const BLOCK: usize = 16 << 10;
 
-/// What pages need to lend cards.
+/// WebAssembly module and chip of the cards that browsers lend.
 pub(super) struct Lending {
     /// WebAssembly module with the card.
     pub(super) module: Vec<u8>,

@@ -30,7 +30,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(super) struct Server {
     gate: Gate,
     hub: Arc<Hub>,
-    /// What browsers need to lend cards; `None` if they may not.
+    /// Module and chip of lent cards; `None` if browsers may lend none.
     lending: Option<Lending>,
     connections: Arc<AtomicUsize>,
     lent: Arc<AtomicUsize>,

@@ -26,7 +26,7 @@ pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError>
 /// Connects to the card at an address.
 ///
 /// # Errors
-/// Unless the card is lent: a browser has no other links.
+/// If the card is not lent: a browser has no other links.
 #[cfg(target_family = "wasm")]
 pub fn reach(address: &RemoteAddress) -> Result<Box<dyn Port + Send>, LinkError> {
     match address {

@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::super::LentCard;
 use super::serial_options::SerialOptions;
+use crate::link::LentCard;
 
 /// Address of a card that is not emulated in this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
