@@ -87,15 +87,16 @@ def frame_of(head, side):
     camera, photons, integrator = head["cameras"][0], head["photons"], head["integrator"]
     half = f32(math.tan(f32(0.5 * f32(camera["projection"]["vertical_fov"]))))
     right, up = ([f32(f32(axis) * half) for axis in camera[name]] for name in ("right", "up"))
-    samples, caustics = integrator["samples"], head["caustics"]
+    samples, caustics = integrator["samples"], head["gathers"]["caustics"]
     error, threshold = integrator["irradiance_error"], integrator["adaptive_threshold"]
+    near = integrator["near_distance"]
     parts = [
         number(side) * 2,
         floats(*camera["origin"], *camera["forward"], *right, *up, 0, 0) + number(0),  # a pinhole, unshifted
         number(integrator["seed"]) + number(0) + number(samples),
         number(integrator["planned_samples"] or samples),
         *(number(integrator[name]) for name in ("gather_rays", "shadow_rays")),
-        number(photons["neighbors"]) + floats(head["max_distance"]),
+        number(photons["neighbors"]) + floats(head["gathers"]["max_distance"]),
         number(("Reflection", "Photon", "Product", "Mixture").index(integrator["sampling"])),
         option(error and floats(error)),
         number(8) + number(2) + number(2**32 - 1),  # bins, drain along a Hilbert curve, queue
@@ -105,6 +106,7 @@ def frame_of(head, side):
         number(1) + b"\0",  # one tile in flight, no kept records
         option(threshold and floats(threshold)),
         b"\0" * 6,  # a background, no sums of position, coverage, identities and light groups; radiance
+        floats(head["gathers"]["near_distance"] if near is None else near),
     ]
     return b"".join(parts)
 

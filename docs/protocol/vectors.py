@@ -36,7 +36,7 @@ FRAME = (
     ("bins", "u32"), ("drain", 4), ("queue", "u32"), ("radiance", 2), ("caustics", [CAUSTICS]),
     ("layers", "flag"), ("filter", 3), ("in_flight", "u32"), ("keep_records", "flag"),
     ("adaptive_threshold", ["f32"]), ("transparent", "flag"), ("position", "flag"), ("coverage", "flag"),
-    ("identities", "flag"), ("light_groups", "u8"), ("irradiance", "flag"),
+    ("identities", "flag"), ("light_groups", "u8"), ("irradiance", "flag"), ("near_distance", "f32"),
 )
 BUDGET = tuple(
     (name, "u64" if name == "dram_bytes" else "u32")

@@ -76,7 +76,7 @@
 //! - `L S+ D S* E`, caustics: the caustic map ([`render::caustic`]).
 //! - `L (S|D)* D S* D S* E`, indirect light: final gather rays alone, followed through S
 //!   ([`render::final_gather`]). At their ends the photon map gives all reflected light, including direct
-//!   light, because no shadow rays start there.
+//!   light, because no shadow rays start there. A ray that ends near its point goes on instead.
 //!
 //! # Exactness
 //!

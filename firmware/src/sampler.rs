@@ -64,6 +64,12 @@ impl Pattern {
         unit_interval(hash(self.bits(index, 0x1656_67b1).wrapping_add(choice)))
     }
 
+    /// Pattern of the path that goes on from the end of point `index`.
+    #[inline(always)]
+    pub fn of_continuations(self, index: u32) -> Self {
+        Self(hash(self.bits(index, 0x3c6e_f372)))
+    }
+
     /// Random bits that determine the position of point `index` within its stratum of [0, 1).
     #[inline(always)]
     pub fn jitter(self, index: u32) -> u32 {

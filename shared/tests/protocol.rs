@@ -245,7 +245,7 @@ fn the_protocol_document_states_this_version() {
 /// protocol version.
 #[test]
 fn structures_have_their_golden_bytes() {
-    assert_eq!(PROTOCOL_VERSION, 17);
+    assert_eq!(PROTOCOL_VERSION, 18);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -320,6 +320,7 @@ fn structures_have_their_golden_bytes() {
         coverage: true,
         identities: false,
         irradiance: true,
+        near_distance: 1.0,
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero, one, zero].concat();
@@ -338,6 +339,7 @@ fn structures_have_their_golden_bytes() {
         &[1, 2, 9, 1, 1],
         &one,
         &[1, 0, 1, 0, 2, 1],
+        &one,
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);

@@ -11,7 +11,9 @@ use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::direct::render_tiles;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
+use photoncard_driver::photon_map::{
+    GatherParameters, MappedImage, PhotonLayout, PhotonSettings, map_photons,
+};
 use photoncard_driver::render::{RenderSettings, Schedule};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
@@ -31,11 +33,11 @@ fn main() {
 const NEIGHBORS: u32 = 100;
 const PHOTONS: usize = 500_000;
 
-/// Scene with its card image, and the maximum radius of a gather, metres.
+/// Scene with its card image, and the parameters of gathers.
 struct Prepared {
     scene: Scene,
     image: CardImage,
-    max_distance: f32,
+    gathers: GatherParameters,
 }
 
 static CORNELL: LazyLock<Prepared> = LazyLock::new(|| prepare("cornell.gltf", PhotonLayout::Jensen));
@@ -50,8 +52,8 @@ fn load(name: &str) -> Scene {
 
 fn prepare(name: &str, layout: PhotonLayout) -> Prepared {
     let scene = load(name);
-    let MappedImage { image, max_distance, .. } = map(&scene, PHOTONS, layout);
-    Prepared { scene, image, max_distance }
+    let MappedImage { image, gathers, .. } = map(&scene, PHOTONS, layout);
+    Prepared { scene, image, gathers }
 }
 
 fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
@@ -113,7 +115,7 @@ fn gather_all(bencher: Bencher, image: &CardImage, shuffled: bool) {
     bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
         let mut found = 0;
         for &query in &queries {
-            let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, CORNELL.max_distance);
+            let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, CORNELL.gathers.max_distance);
             gather(&scene, &mut memory, PhotonMap::Indirect, query, &mut nearest).expect("sound");
             found += nearest.len();
         }
@@ -173,7 +175,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     };
     let settings =
         RenderSettings { schedule: Schedule { order, ..Schedule::default() }, ..RenderSettings::default() };
-    let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance, None);
+    let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), &CORNELL.gathers);
     let (scene, _) = CORNELL.image.view();
     let mut job = RenderJob { scene: &scene, memory: &mut memory, frame: &frame, outlet: None };
     let mut chip = EmulatedKind::Reference.emulated().chip();

@@ -32,12 +32,13 @@ fn memory() -> Vec<u8> {
             gather_rays: 16,
             sampling: Sampling::Reflection,
             irradiance_error: None,
+            near_distance: Some(0.0),
             ..Integrator::default()
         },
         ..RenderSettings::default()
     };
     let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");
-    let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
+    let frame = settings.frame(&scene.cameras[0], &mapped.gathers);
     let frame = FrameParameters { drain: Drain::Immediate, ..frame };
     let mut behind = [0; LINE_BYTES];
     let (length, bytes) = behind.split_first_mut().expect("a line has bytes");

@@ -37,6 +37,7 @@ fn settings(has_all: bool) -> RenderSettings {
             gather_rays: 100,
             shadow_rays: 8,
             sampling: Sampling::Reflection,
+            near_distance: Some(0.0),
             ..Integrator::default()
         },
         ..RenderSettings::default()

@@ -5,7 +5,7 @@ use photoncard_driver::emulator::direct::render_tile_of;
 use photoncard_driver::emulator::{EmulatedChip, EmulatedKind};
 use photoncard_driver::film::{SumFormat, Window};
 use photoncard_driver::pack::{CardImage, PackedScene};
-use photoncard_driver::photon_map::{MappedImage, map_photons};
+use photoncard_driver::photon_map::{GatherParameters, MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
@@ -19,15 +19,14 @@ use photoncard_firmware::render::{Context, GatherPoint};
 use photoncard_firmware::sampler::{Dimension, Pattern};
 use photoncard_firmware::scene::Surface;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{CausticGather, FrameParameters, Sampling, Tile};
+use photoncard_shared::message::{FrameParameters, Sampling, Tile};
 use rayon::prelude::*;
 
 /// Scene with its card image, photon map included.
 pub struct MappedScene {
     scene: Scene,
     image: CardImage,
-    max_distance: f32,
-    caustics: Option<CausticGather>,
+    gathers: GatherParameters,
 }
 
 /// Pixels of a frame's window, and the counted work of all its tiles.
@@ -45,9 +44,9 @@ impl MappedScene {
     /// If the scene cannot be packed, or its photons cannot be traced.
     pub fn new(scene: Scene, settings: &RenderSettings) -> Self {
         let packed = PackedScene::new(&scene).expect("packs");
-        let MappedImage { image, max_distance, caustics, .. } =
+        let MappedImage { image, gathers, .. } =
             map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
-        Self { scene, image, max_distance, caustics }
+        Self { scene, image, gathers }
     }
 
     /// Renders the window of a frame on reference chips in this process, one per thread.
@@ -58,7 +57,7 @@ impl MappedScene {
     pub fn frame(&self, settings: &RenderSettings) -> Frame {
         let window = settings.window();
         let camera = settings.camera(&self.scene).expect("a camera");
-        let frame = settings.frame(&camera, self.max_distance, self.caustics);
+        let frame = settings.frame(&camera, &self.gathers);
         let tiles = tiles(window, settings.tile_side(&[REFERENCE]), settings.schedule.order);
         let pool = rayon::ThreadPoolBuilder::new().build().expect("threads");
         let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
@@ -97,7 +96,7 @@ impl<'a> IndirectLight<'a> {
     /// If the scene has no camera of the settings' name, or the card image is malformed.
     pub fn new(mapped: &'a MappedScene, settings: &RenderSettings, side: u32) -> Self {
         let camera = settings.camera(&mapped.scene).expect("a camera");
-        let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
+        let frame = settings.frame(&camera, &mapped.gathers);
         let (scene, mut memory) = mapped.image.view();
         let mut counters = Counters::ZERO;
         let mut context =
@@ -133,9 +132,12 @@ impl<'a> IndirectLight<'a> {
             let mut ends = GatherRayEnds::new();
             for bundle in bundles(0..rays) {
                 cast(&mut context, &point, target, bundle, &mut ends).expect("sound");
-                for request in ends.iter().filter_map(|end| end.request.as_ref()) {
-                    let brought = gathered(&mut context, request, candidates.view()).expect("sound");
-                    sum += brought.total(LightGroups::ONE);
+                for end in &ends {
+                    sum += end.reflected.total(LightGroups::ONE);
+                    if let Some(request) = &end.request {
+                        let brought = gathered(&mut context, request, candidates.view()).expect("sound");
+                        sum += brought.total(LightGroups::ONE);
+                    }
                 }
             }
             sum * scene.header.radiance_unit

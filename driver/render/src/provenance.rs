@@ -33,8 +33,13 @@ impl Provenance {
     ) -> Self {
         let mut pixels = settings.identity(scene);
         pixels.extend(settings.picture.of_layers());
-        // The distance in use, which is derived from the photons if none is stated.
-        pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
+        // The distances in use, which are derived from the photons if none are stated.
+        for (name, distance) in [("max-distance", frame.max_distance), ("near-distance", frame.near_distance)]
+        {
+            if pixels.get(name).is_none_or(Value::is_null) {
+                pixels.insert(name.to_owned(), json!({ "auto": distance }));
+            }
+        }
         pixels.insert("view".to_owned(), view(camera));
         let mut work = settings.of_work();
         work.extend(settings.of_cards());

@@ -227,7 +227,7 @@ impl Renderer {
             camera: camera_of_frame,
             first_sample: outputs.base.as_ref().map_or(0, |base| base.format().samples),
             samples: film.format().samples,
-            ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
+            ..settings.frame(&camera, &prepared.gathers)
         };
         cards.leave_out(&|budget| settings.check_waiting_room(&frame, image, budget), needed, observer)?;
         let film = Mutex::new(film);

@@ -7,14 +7,14 @@ use std::time::Instant;
 use photoncard_cards::scheduler::TileCounts;
 use photoncard_cards::session::LinkBytes;
 use photoncard_map::pack::{CardImage, PackedScene};
-use photoncard_map::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_photons};
+use photoncard_map::photon_map::{self, GatherParameters, Guiding, MappedImage, PhotonTimes, map_photons};
 use photoncard_picture::cryptomatte::Identities;
 use photoncard_picture::film::Film;
 use photoncard_picture::sink::TileSink;
 use photoncard_scene::Scene;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
+use photoncard_shared::message::{FrameParameters, Tile};
 use serde::Serialize;
 
 use super::outputs::Outputs;
@@ -74,10 +74,8 @@ pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
     /// Names of the image's identities; `None` for an image without identities.
     pub(super) identities: Option<Arc<Identities>>,
-    /// Maximum distance of a gather, metres.
-    pub(super) max_distance: f32,
-    /// Parameters of gathers in the caustic map.
-    pub(super) caustics: Option<CausticGather>,
+    /// Parameters of gathers in the photon maps.
+    pub(super) gathers: GatherParameters,
     /// Number of light paths that were traced for the photons.
     pub(super) paths: u64,
     /// Guiding of the photon paths to the camera; `None` if photons are for any camera.
@@ -116,8 +114,8 @@ pub(super) fn prepare(
     times.photon_map = building.as_secs_f64();
     times.discs = measuring.as_secs_f64();
     times.irradiance = estimating.as_secs_f64();
-    let MappedImage { image, max_distance, caustics, paths, guiding, .. } = mapped;
-    Ok(Prepared { image: Arc::new(image), identities, max_distance, caustics, paths, guiding })
+    let MappedImage { image, gathers, paths, guiding, .. } = mapped;
+    Ok(Prepared { image: Arc::new(image), identities, gathers, paths, guiding })
 }
 
 /// Times of the phases, seconds.

@@ -188,7 +188,7 @@ impl Bench<'_> {
     /// If the settings' camera is not possible in the scene.
     pub(crate) fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
-        Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
+        Ok(settings.frame(&camera, &self.mapped.gathers))
     }
 
     /// Renders `tiles` on chips of the kind `chip`. If `model` is given, the memory is modelled with its

@@ -228,7 +228,8 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileDevia
 }
 
 /// Returns `settings` with fixed values for the settings that do not change indirect light: tiles of 16x16
-/// pixels, sorted gathers with the chip's own queue, and no shadow rays.
+/// pixels, sorted gathers with the chip's own queue, no shadow rays, and photon gathers at the ends of all
+/// gather rays.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {
         schedule: Schedule {
@@ -244,6 +245,8 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
         ..settings.clone()
     };
     comparable.integrator.shadow_rays = 0;
+    // The indirect light at near ends would need the emission that [`indirect`] takes away.
+    comparable.integrator.near_distance = Some(0.0);
     comparable
 }
 
@@ -252,10 +255,9 @@ type TilePixels = Vec<Vec<[f64; 3]>>;
 
 /// Indirect light in `count` tiles, rendered from a card image that has the scene's photons but no emission.
 fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
-    let MappedImage { image, max_distance, caustics, paths, guiding, times } = bench.mapped;
-    let (max_distance, caustics) = (*max_distance, *caustics);
+    let MappedImage { image, gathers, paths, guiding, times } = bench.mapped;
     let image = image.without_emission();
-    let dark = MappedImage { image, max_distance, caustics, paths: *paths, guiding: *guiding, times: *times };
+    let dark = MappedImage { image, gathers: *gathers, paths: *paths, guiding: *guiding, times: *times };
     let bench = Bench { mapped: &dark, ..*bench };
     pixels(&bench, settings, true, count, |pixel| pixel.layers.indirect)
 }
@@ -311,7 +313,7 @@ mod tests {
             let settings = RenderSettings {
                 picture: Picture { width: 32, height: 32, ..Picture::default() },
                 photons: PhotonMaps { count: 10_000, neighbors: 30, ..PhotonMaps::default() },
-                integrator: Integrator { gather_rays: 16, ..Integrator::default() },
+                integrator: Integrator { gather_rays: 16, near_distance: Some(0.0), ..Integrator::default() },
                 ..RenderSettings::default()
             };
             let pool = ThreadPoolBuilder::new().num_threads(2).build();

@@ -172,6 +172,8 @@ impl Scale {
                 gather_rays: self.gather_rays,
                 shadow_rays: self.shadow_rays,
                 sampling: Sampling::Reflection,
+                // As in the dissertation, photons are gathered at the end of every gather ray.
+                near_distance: Some(0.0),
                 ..Integrator::default()
             },
             schedule: Schedule { tile: Some(TILE), order, in_flight: Some(1), ..Schedule::default() },

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use photoncard_driver::photon_map::GatherParameters;
 use photoncard_driver::render::{Integrator, Picture, RenderSettings};
 use photoncard_driver::scene::Camera;
 use photoncard_driver::session::{
@@ -34,7 +35,7 @@ fn frame() -> FrameParameters {
         integrator: Integrator { gather_rays: 100, samples: 10, ..Integrator::default() },
         ..RenderSettings::default()
     }
-    .frame(&camera, 1.0, None)
+    .frame(&camera, &GatherParameters::within(1.0))
 }
 
 const IMAGE_LINES: usize = 100;

@@ -51,6 +51,7 @@ pub(super) fn check_frame(
                 .caustics
                 .is_none_or(|gather| neighbors(gather.neighbors) && is_positive(gather.max_distance)),
         ),
+        (Parameter::NearDistance, frame.near_distance.is_finite() && frame.near_distance >= 0.0),
     ];
     match checks.iter().find(|(_, holds)| !holds) {
         Some((parameter, _)) => Err(parameter.fault()),

@@ -202,7 +202,7 @@ impl<K: ChipKind> Flight<K> {
         };
         let (at, weight) = self.present_path(job.frame, pixel.into());
         let pattern = pattern(job.frame, at);
-        let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame.bins)?;
+        let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame)?;
         let (_, stored) = shared.points.get(index)?;
         let number = self.sum(pixel.into()).ok_or(Invariant::Sums.fault())?;
         let index_in_tile = self.index_in_tile(pixel.into());
@@ -218,6 +218,9 @@ impl<K: ChipKind> Flight<K> {
             for end in &ends {
                 let sum = (flight, number);
                 shared.sums.add(context.frame, sum, Component::Direct, &end.direct)?;
+                if !end.reflected.is_none() {
+                    shared.sums.add(context.frame, sum, Component::Indirect, &end.reflected)?;
+                }
                 match (end.request, outlet.as_deref_mut()) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),

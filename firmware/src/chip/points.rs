@@ -2,10 +2,10 @@
 
 use core::ops::Range;
 
-use photoncard_shared::message::{Fault, Invariant};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use super::position::Position;
-use super::stored_point::StoredPoint;
+use super::stored_point::{StoredPoint, rays_per_step};
 use crate::kind::{Buffer, Capacity};
 use crate::sampler::Pattern;
 
@@ -73,20 +73,21 @@ impl<C: Capacity> Points<C> {
         Some((index as u32, *self.owners.values().get(index)?))
     }
 
-    /// Takes the next rays of point `index` in the current direction bin, and advances `position` past them.
-    /// There are `bins` bins in all.
+    /// Takes the next rays of point `index` in the current direction bin of `frame`, and advances `position`
+    /// past them.
     #[inline(always)]
     pub(super) fn take_rays(
         &mut self,
         position: &mut Position,
         index: u32,
         pattern: Pattern,
-        bins: u32,
+        frame: &FrameParameters,
     ) -> Result<Range<u32>, Fault> {
         let at = index as usize;
         let point = self.points.values().get(at).zip(self.bins.values_mut().get_mut(at));
         let (point, bin) = point.ok_or(Invariant::Points.fault())?;
-        let (rays, next) = point.next_rays(pattern, position.rays_cast(), [position.bin, bins]);
+        let cast = [position.rays_cast(), rays_per_step(frame)];
+        let (rays, next) = point.next_rays(pattern, cast, [position.bin, frame.bins]);
         *bin = next.map_or(*bin, |next| next as u8);
         position.pass_rays(index, rays.len() as u32, next != Some(position.bin));
         Ok(rays)

@@ -104,7 +104,7 @@ impl<K: ChipKind> Flight<K> {
         let target = self.target(flight, PointIndex::Record(record));
         let Self { cache, counters, position, waiting, .. } = self;
         let mut point = cache.point(job.frame, record.into()).ok_or(Invariant::Record.fault())?;
-        let rays = points.take_rays(position, index, point.pattern, bins)?;
+        let rays = points.take_rays(position, index, point.pattern, job.frame)?;
         point.directions = points.get(index)?.1.directions;
         let context = &mut job.context(counters);
         let mut ends = final_gather::GatherRayEnds::new();
@@ -112,6 +112,9 @@ impl<K: ChipKind> Flight<K> {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
                 cache.add(record, end.cell, &end.direct)?;
+                if !end.reflected.is_none() {
+                    cache.add(record, end.cell, &end.reflected)?;
+                }
                 if let Some(request) = end.request {
                     match gathers.submit(context, rounds, request)? {
                         None => *waiting += 1,

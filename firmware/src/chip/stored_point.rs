@@ -14,6 +14,14 @@ use crate::scene::{Seen, Surface};
 
 /// Maximum number of gather rays of one point that are cast in one piece of work.
 const RAYS_PER_STEP: u32 = 64;
+/// [`RAYS_PER_STEP`] in a frame with near ends, each of which brings further rays.
+const RAYS_PER_STEP_WITH_NEAR_ENDS: u32 = 16;
+
+/// Maximum number of gather rays of one point that are cast in one piece of work of `frame`.
+#[inline(always)]
+pub(super) fn rays_per_step(frame: &FrameParameters) -> u32 {
+    if frame.near_distance > 0.0 { RAYS_PER_STEP_WITH_NEAR_ENDS } else { RAYS_PER_STEP }
+}
 
 /// Part of a gather point that is stored while the point's rays are cast, one direction bin after another; 48
 /// bytes. The remainder is computed again in each bin.
@@ -67,13 +75,13 @@ impl StoredPoint {
         self.directions.bin(pattern, 0, self.rays.number(), bins)
     }
 
-    /// Returns the next rays of direction bin `bin`, at least one and at most [`RAYS_PER_STEP`], and the bin
-    /// of the ray after them, if any. `done` rays of the bin were already cast.
+    /// Returns the next rays of direction bin `bin`, at least one and at most `most`, and the bin of the ray
+    /// after them, if any. `done` rays of the bin were already cast.
     #[inline(always)]
     pub(super) fn next_rays(
         &self,
         pattern: Pattern,
-        done: u32,
+        [done, most]: [u32; 2],
         [bin, bins]: [u32; 2],
     ) -> (Range<u32>, Option<u32>) {
         let number = self.rays.number();
@@ -81,7 +89,7 @@ impl StoredPoint {
         let mut end = first + 1;
         while end < number {
             let next = self.directions.bin(pattern, end, number, bins);
-            if next != bin || end - first == RAYS_PER_STEP {
+            if next != bin || end - first == most {
                 return (first..end, Some(next));
             }
             end += 1;
@@ -139,15 +147,24 @@ mod tests {
 
     #[test]
     fn all_rays_are_cast_bin_by_bin_and_none_twice() {
-        for (rays, bins) in [(1, 99), (5, 1), (64, 1), (65, 2), (300, 99), (16_384, 256)] {
+        let sizes = [
+            (1, 99, 64),
+            (5, 1, 64),
+            (64, 1, 16),
+            (64, 1, 64),
+            (65, 2, 64),
+            (300, 99, 16),
+            (16_384, 256, 64),
+        ];
+        for (rays, bins, most) in sizes {
             let pattern = Pattern::new(7, rays, bins, 0, Dimension::Gather);
             let directions = DirectionTable::COSINE;
             let stored = StoredPoint { seen: Seen::NOWHERE, directions, rays: StoredRays(rays as u16) };
             let mut cast = Vec::new();
             let (mut bin, mut done) = (Some(stored.first_bin(pattern, bins)), 0);
             while let Some(present) = bin {
-                let (rays, next) = stored.next_rays(pattern, done, [present, bins]);
-                assert!((1..=RAYS_PER_STEP as usize).contains(&rays.len()));
+                let (rays, next) = stored.next_rays(pattern, [done, most], [present, bins]);
+                assert!((1..=most as usize).contains(&rays.len()));
                 done = if next == bin { done + rays.len() as u32 } else { 0 };
                 assert!(next.is_none_or(|next| present <= next && next < bins));
                 cast.extend(rays);

@@ -35,5 +35,6 @@ pub(super) fn frame() -> FrameParameters {
         coverage: false,
         identities: false,
         irradiance: false,
+        near_distance: 0.0,
     }
 }

@@ -113,7 +113,7 @@ fn one_gather_point_too_many_is_a_fault() {
     let stored = StoredPoint::of_record(&point);
     let broken = Invariant::Points.fault();
     assert_eq!(points.get(0).err(), Some(broken));
-    assert_eq!(points.take_rays(&mut Position::at(Pass::Rays), 0, pattern, 1), Err(broken));
+    assert_eq!(points.take_rays(&mut Position::at(Pass::Rays), 0, pattern, frame), Err(broken));
     for _ in 0..<Micro as ChipKind>::Points::ENTRIES {
         assert_eq!(points.push(0, stored, 0), Ok(()));
     }

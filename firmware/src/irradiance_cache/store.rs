@@ -273,6 +273,7 @@ mod tests {
             coverage: true,
             identities: true,
             irradiance: true,
+            near_distance: 1.0,
         }
     }
 

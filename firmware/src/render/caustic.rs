@@ -1,5 +1,5 @@
 //! Caustics, paths `L S+ D S* E`, by a gather in the caustic map at the surface that the eye sees (Jensen
-//! 1996, *Global illumination using photon maps*).
+//! 1996, *Global illumination using photon maps*), or at the near end of a gather ray.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;

@@ -31,7 +31,7 @@ use photoncard_shared::message::{Fault, Invariant};
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
-use crate::sampler::Dimension;
+use crate::sampler::{Dimension, Pattern};
 use crate::scene::light::{
     LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance,
     sample_light,
@@ -49,18 +49,40 @@ pub fn reflected<M: MemoryPort>(
     pixel: PixelSample,
     point: &GatherPoint,
 ) -> Result<GroupedLight, Fault> {
-    if point.surface.reflection.is_black() || context.frame.shadow_rays == 0 {
+    let (pattern, sample) = pixel.stratified(context.frame, Dimension::Emitter);
+    by_shadow_rays(context, point, (pattern, sample))
+}
+
+/// Direct light that the near end of a gather ray reflects, W/(sr m^2), by light group, estimated by one
+/// shadow ray and weighted against the gather ray that goes on.
+///
+/// # Errors
+/// If the card image is invalid.
+pub fn reflected_by_one<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+) -> Result<GroupedLight, Fault> {
+    by_shadow_rays(context, point, (point.pattern, 0))
+}
+
+/// Direct light by the shadow rays of a point: those of sample `sample` among all that have the pattern.
+#[inline(never)]
+fn by_shadow_rays<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+    (pattern, sample): (Pattern, u32),
+) -> Result<GroupedLight, Fault> {
+    let shadow_rays = point.shadow_rays(context.frame);
+    if point.surface.reflection.is_black() || shadow_rays == 0 {
         return Ok(GroupedLight::NONE);
     }
     context.memory.enter(Stage::Shadow);
-    let frame = context.frame;
-    let (pattern, sample) = pixel.stratified(frame, Dimension::Emitter);
     let receiver = Receiver::new(&point.surface);
     let mut choices = LightChoices::new(receiver);
     let mut sum = GroupedLight::NONE;
     let mut rays = ShadowRays::new();
-    for index in 0..frame.shadow_rays {
-        let index = sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
+    for index in 0..shadow_rays {
+        let index = sample.wrapping_mul(shadow_rays).wrapping_add(index);
         let (place, dither) = (pattern.point(index), pattern.dither(index));
         let light = sample_light(context.scene, context.memory, &mut choices, place, dither)?;
         if let Some(light) = light
@@ -74,7 +96,7 @@ pub fn reflected<M: MemoryPort>(
         }
     }
     rays.cast(context, point, &mut sum)?;
-    Ok(sum / frame.shadow_rays as f32)
+    Ok(sum / shadow_rays as f32)
 }
 
 /// Shadow rays of a point that are cast together, each with its light sample.
@@ -131,7 +153,7 @@ fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample)
     // No gather ray meets a light without extent: weight 1.
     let weight = density.map_or(1.0, |density| {
         let by_gather_rays = (point.rays, point.directions.density(&reflector, direction));
-        balance((context.frame.shadow_rays, density), by_gather_rays)
+        balance((point.shadow_rays(context.frame), density), by_gather_rays)
     });
     let shared = reflector.evaluate(direction);
     let mut reflected = shared * weight;
@@ -206,7 +228,7 @@ fn weight_of_gather_ray<M>(
         let cosine = point.surface.normal.dot(direction);
         power(rays_of_record(context, cosine), shadow_rays_for_records(context, density))
     } else {
-        balance((point.rays, gather_density), (context.frame.shadow_rays, density))
+        balance((point.rays, gather_density), (point.shadow_rays(context.frame), density))
     }
 }
 

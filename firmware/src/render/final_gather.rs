@@ -1,6 +1,7 @@
 //! Final gather: rays over the hemisphere, with a photon gather at the end of each ray.
 //!
-//! Emission at the end of a ray is direct light, weighted against shadow rays ([`super::direct`]).
+//! Emission at the end of a ray is direct light, weighted against shadow rays ([`super::direct`]). A ray that
+//! ends near goes on ([`near`]).
 
 use core::ops::Range;
 
@@ -8,9 +9,9 @@ use glam::Vec3;
 use heapless::Vec;
 use photoncard_shared::message::{Fault, Invariant, Radiance};
 
+use super::gather_ray::{Arrived, Reached, arrive};
 use super::search::count_reflection;
-use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
-use super::{Context, GatherPoint, direct};
+use super::{Context, GatherPoint, near};
 use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::light_groups::{GroupedLight, LightGroups};
@@ -18,11 +19,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::photon::{
     Candidates, GatherLimits, NearestPhotons, Reflected, gathered_radiance, nearest_irradiance,
 };
-use crate::scene::light::environment_radiance;
-use crate::scene::{
-    BUNDLE_RAYS, Detail, Hit, PartialReflection, Ray, RayKind, Reflector, Surface, closest_hits,
-    read_surface_with,
-};
+use crate::scene::{BUNDLE_RAYS, PartialReflection, Ray, RayKind, Surface, closest_hits};
 
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +29,11 @@ pub struct GatherRayEnd {
     /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units,
     /// by light group.
     pub direct: GroupedLight,
-    /// Request for the photon gather at the end of the ray; `None` if no reflecting surface is there.
+    /// Light that the ends of the ray and of its continuations reflect, if they are near ([`near`]), in the
+    /// card image's radiance units, by light group.
+    pub reflected: GroupedLight,
+    /// Request for the photon gather at the end of the ray, or of its last continuation; `None` if no
+    /// reflecting surface is there.
     pub request: Option<GatherRequest>,
 }
 
@@ -74,149 +75,36 @@ pub fn cast<M: MemoryPort>(
     let mut hits = [None; BUNDLE_RAYS];
     closest_hits(context.scene, context.memory, &bundle, &mut hits)?;
     for (((index, sampled), ray), hit) in aimed.iter().zip(&bundle).zip(&mut hits) {
-        if let Some(end) =
-            arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))?
-        {
-            ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
+        // The weight is divided by the number of rays here, so that sums stay within the fixed-point range.
+        let weight = sampled.weight * (point.weight / point.rays as f32);
+        let mut met = Surface::NOWHERE;
+        let Arrived { direct, reached } =
+            arrive(context, point, (*index, sampled, weight), (ray, hit), &mut met)?;
+        let (mut pattern, mut index) = (point.pattern, *index);
+        let mut reflected = GroupedLight::NONE;
+        let mut gathered = reached.map(|reached| reached.weight);
+        if let Some(Reached { weight, .. }) = reached.filter(|end| near::is_near(context.frame, end)) {
+            (pattern, index) = (pattern.of_continuations(index), 0);
+            gathered = near::follow(context, pattern, weight, &mut met, &mut reflected)?;
         }
+        let header = &context.scene.header;
+        let request = gathered.map(|weight| GatherRequest {
+            position: HilbertCode::new(&header.photon_grid, met.position.to_array())
+                .with_length(&header.photon_grid, met.distance),
+            reflection: PartialReflection::encode(
+                &met.reflector(),
+                weight * (header.photon_power_unit / header.radiance_unit),
+                pattern.dither(index),
+            ),
+            target: target.in_cell(sampled.cell),
+        });
+        let end = GatherRayEnd { cell: sampled.cell, direct, reflected, request };
+        if request.is_none() && direct.is_none() && reflected.is_none() {
+            continue;
+        }
+        ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
     }
     Ok(())
-}
-
-/// Contribution of ray `index` of a gather point, from its sampled direction and its hit.
-fn arrive<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-    target: GatherTarget,
-    (index, sampled): (u32, &GatherDirection),
-    (ray, hit): (&Ray, &mut Option<Hit>),
-) -> Result<Option<GatherRayEnd>, Fault> {
-    let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
-    // The weight is divided by the number of rays here, so that sums stay within the fixed-point range.
-    let weight = sampled.weight * (point.weight / point.rays as f32);
-    let Some(hit) = hit else {
-        return escaped(context, point, &path, sampled, weight);
-    };
-    let random = |choice| point.pattern.choice(index, choice);
-    let of_surface = |choice| random(surface_choice(0, choice));
-    let mut met = Surface::NOWHERE;
-    read_surface_with(context.scene, context.memory, ray, hit, Detail::Gathering, &of_surface, &mut met)?;
-    if path.may_pass(&met) {
-        match path.follow(context, &mut met, hit, &random)? {
-            PathEnd::Surface => {}
-            PathEnd::Escaped => return escaped(context, point, &path, sampled, weight),
-            PathEnd::Lost => {
-                let direct = collected(context, point, &path, sampled, weight);
-                return Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }));
-            }
-        }
-    }
-    met.normal = met.geometric_normal;
-    let emitted = if path.is_straight {
-        met.distance += path.travelled;
-        weight * direct::seen_by_gather_ray(context, point, ray, &met, sampled.density)?
-    } else {
-        beyond_specular(context, point, sampled, weight) * met.emission
-    };
-    let mut direct = collected(context, point, &path, sampled, weight);
-    let emitted = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
-    direct.add(LightGroups::of(context.frame).index(met.light_group), emitted);
-    let weight = weight * path.throughput;
-    let header = &context.scene.header;
-    let request = (!met.reflection.is_black()).then(|| GatherRequest {
-        position: HilbertCode::new(&header.photon_grid, met.position.to_array())
-            .with_length(&header.photon_grid, met.distance),
-        reflection: PartialReflection::encode(
-            &met.reflector(),
-            weight * (header.photon_power_unit / header.radiance_unit),
-            point.pattern.dither(index),
-        ),
-        target,
-    });
-    Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
-}
-
-/// Contribution of a gather ray that leaves the scene: light of the environment, and light collected on the
-/// path. `None` if there is neither.
-#[inline(never)]
-fn escaped<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-    path: &SpecularPath,
-    sampled: &GatherDirection,
-    weight: Vec3,
-) -> Result<Option<GatherRayEnd>, Fault> {
-    let mut direct = collected(context, point, path, sampled, weight);
-    if context.scene.header.lights.texture.is_none() {
-        let end = GatherRayEnd { cell: sampled.cell, direct, request: None };
-        return Ok((!direct.is_none()).then_some(end));
-    }
-    let emitted = if path.is_straight {
-        weight * direct::escaped(context, point, path.ray.direction, sampled.density)?
-    } else {
-        let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
-        beyond_specular(context, point, sampled, weight) * radiance
-    };
-    let lights = &context.scene.header.lights;
-    let emitted = emitted * path.throughput * (1.0 / context.scene.header.radiance_unit);
-    direct.add(LightGroups::of(context.frame).index(lights.light_group), emitted);
-    Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
-}
-
-/// Light of point, spot and distant lights that narrow lobes on the path reflect, times the ray's weight, in
-/// the card image's radiance units. Zero if the gather point takes this light from the caustic map.
-#[inline(always)]
-fn collected<M>(
-    context: &Context<M>,
-    point: &GatherPoint,
-    path: &SpecularPath,
-    sampled: &GatherDirection,
-    weight: Vec3,
-) -> GroupedLight {
-    if path.bounces == 0 {
-        GroupedLight::NONE
-    } else {
-        collected_by_lobes(context, point, path, sampled, weight)
-    }
-}
-
-#[inline(never)]
-fn collected_by_lobes<M>(
-    context: &Context<M>,
-    point: &GatherPoint,
-    path: &SpecularPath,
-    sampled: &GatherDirection,
-    weight: Vec3,
-) -> GroupedLight {
-    let is_by_map = context.frame.caustics.is_some() && point.surface.reflection.gathers_caustics();
-    if path.collected.is_none() || is_by_map {
-        return GroupedLight::NONE;
-    }
-    path.collected
-        * beyond_specular(context, point, sampled, weight)
-        * (1.0 / context.scene.header.radiance_unit)
-}
-
-/// Weight of emission at the end of a gather ray that passed more than flat glass: specular surfaces or
-/// narrow lobes. No shadow ray finds this light. Without a caustic map the weight is `weight`. With a caustic
-/// map, it is the part of `weight` that belongs to the gather point's narrow lobe: the map lights all other
-/// reflection.
-fn beyond_specular<M>(
-    context: &Context<M>,
-    point: &GatherPoint,
-    sampled: &GatherDirection,
-    weight: Vec3,
-) -> Vec3 {
-    if context.frame.caustics.is_none() {
-        return weight;
-    }
-    let reflector = point.reflector();
-    let lobe = Reflector { reflection: reflector.reflection.narrow_lobe(), ..reflector };
-    if lobe.reflection.is_black() {
-        return Vec3::ZERO;
-    }
-    let [part, whole] = [lobe, reflector].map(|reflector| reflector.evaluate(sampled.direction));
-    weight * Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, Vec3::ZERO)
 }
 
 /// Executes a gather. Returns the radiance that it contributes to its target, in the card image's radiance

@@ -6,6 +6,8 @@ pub mod direct;
 pub mod eye;
 pub mod features;
 pub mod final_gather;
+mod gather_ray;
+mod near;
 mod pixel_filter;
 mod point;
 mod search;

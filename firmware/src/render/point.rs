@@ -1,7 +1,7 @@
 //! Gather points: origin, purpose and directions of final gather rays.
 
 use photoncard_shared::layout::encode_normal;
-use photoncard_shared::message::{Fault, Sampling};
+use photoncard_shared::message::{Fault, FrameParameters, Sampling};
 
 use super::Context;
 use super::search::search;
@@ -38,6 +38,8 @@ pub enum Purpose {
     Lobe,
     /// The rays gather the irradiance of an irradiance record, from which many samples are interpolated.
     Record,
+    /// One ray continues a gather ray that ends near its own point.
+    Near,
 }
 
 /// Minimum number of gather rays for a direction table that depends on photons. With fewer rays such a table
@@ -84,6 +86,24 @@ impl GatherPoint {
             purpose: Purpose::Lobe,
             weight: 1.0,
         }
+    }
+
+    /// Creates the gather point at the near end of a gather ray.
+    pub fn near(surface: Surface, pattern: Pattern) -> Self {
+        Self {
+            surface,
+            pattern,
+            rays: 1,
+            directions: DirectionTable::of_reflection(&surface.reflector()),
+            purpose: Purpose::Near,
+            weight: 1.0,
+        }
+    }
+
+    /// Number of the point's shadow rays in `frame`.
+    #[inline(always)]
+    pub fn shadow_rays(&self, frame: &FrameParameters) -> u32 {
+        if self.purpose == Purpose::Near { 1 } else { frame.shadow_rays }
     }
 
     /// Reflection whose light the rays gather: the surface's whole reflection or, for [`Purpose::Lobe`], its

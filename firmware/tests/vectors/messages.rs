@@ -132,6 +132,7 @@ pub(crate) const FRAME: FrameParameters = FrameParameters {
     coverage: false,
     identities: false,
     irradiance: false,
+    near_distance: 0.25,
 };
 
 /// A frame of sensors.
@@ -180,6 +181,7 @@ const FULL_FRAME: FrameParameters = FrameParameters {
     coverage: true,
     identities: true,
     irradiance: true,
+    near_distance: 0.1875,
 };
 
 fn projected(projection: &Projection) -> String {
@@ -241,6 +243,7 @@ fn frame(frame: &FrameParameters) -> Vec<(&'static str, String)> {
         ("coverage", u8::from(frame.coverage).to_string()),
         ("identities", u8::from(frame.identities).to_string()),
         ("irradiance", u8::from(frame.irradiance).to_string()),
+        ("near_distance", frame.near_distance.to_string()),
     ]
 }
 

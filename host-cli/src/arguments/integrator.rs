@@ -6,6 +6,7 @@ use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{Integrator, MIN_IRRADIANCE_ERROR, Sampling};
 
 use super::choice::{choice, switch};
+use super::distance::Distance;
 
 #[derive(Args)]
 #[command(next_help_heading = "Rays and samples")]
@@ -49,6 +50,13 @@ pub(crate) struct IntegratorOptions {
     /// sampling is off if all other settings of samples and rays are stated.
     #[arg(long, value_name = "THRESHOLD|off", value_parser = adaptive, allow_negative_numbers = true, hide_short_help = true)]
     adaptive: Option<Adaptive>,
+    /// Length below which a gather ray goes on from its end, metres, or auto: derived from the density of the
+    /// photons [default: auto; 0 for paper and in studies]
+    ///
+    /// In narrow gaps photons from outside would light the end of a short ray. With 0, every gather ray ends
+    /// in a photon gather.
+    #[arg(long, value_name = "METRES|auto", value_parser = Distance::near, allow_negative_numbers = true, hide_short_help = true)]
+    near_distance: Option<Distance>,
 }
 
 /// Value of `--adaptive`.
@@ -79,6 +87,7 @@ impl IntegratorOptions {
                 Some(Adaptive::Off) => None,
                 Some(Adaptive::Threshold(threshold)) => Some(threshold),
             },
+            near_distance: self.near_distance.map_or(base.near_distance, Distance::stated),
         }
     }
 
@@ -109,6 +118,8 @@ impl IntegratorOptions {
         add(self.ic_error.is_some() && !is_cached, "--ic-error", not_cached);
         let has_no_rays = self.irradiance_cache == Some(true) && self.gather_rays == Some(0);
         add(has_no_rays, "--irradiance-cache on", "with --gather-rays 0");
+        let is_unused = self.near_distance.is_some() && self.gather_rays == Some(0);
+        add(is_unused, "--near-distance", "with --gather-rays 0");
     }
 }
 

@@ -4,6 +4,7 @@ mod autonomy;
 mod bake;
 mod cards;
 mod choice;
+mod distance;
 mod farm;
 mod files;
 mod frames;

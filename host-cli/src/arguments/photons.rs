@@ -7,6 +7,7 @@ use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{PhotonMaps, Radiance};
 
 use super::choice::choice;
+use super::distance::Distance;
 
 #[derive(Args)]
 #[command(next_help_heading = "Photon maps")]
@@ -32,18 +33,12 @@ pub(crate) struct PhotonOptions {
     #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true)]
     caustic_neighbors: Option<u32>,
     /// Maximum distance of the photons in a gather, metres, or auto: derived from the density of the photons
-    #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true, hide_short_help = true)]
-    max_distance: MaxDistance,
+    #[arg(long, default_value = "auto", value_parser = Distance::greatest, allow_negative_numbers = true, hide_short_help = true)]
+    max_distance: Distance,
     /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; a surface with a Phong
     /// lobe always has the estimate density
     #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>(), hide_short_help = true)]
     radiance: Radiance,
-}
-
-#[derive(Clone, Copy)]
-pub(super) enum MaxDistance {
-    Auto,
-    Metres(f32),
 }
 
 impl PhotonOptions {
@@ -83,21 +78,10 @@ impl PhotonOptions {
             photons_for: base.photons_for,
             layout: self.photon_map,
             neighbors: self.neighbors.unwrap_or(base.neighbors),
-            max_distance: match self.max_distance {
-                MaxDistance::Auto => None,
-                MaxDistance::Metres(distance) => Some(distance),
-            },
+            max_distance: self.max_distance.stated(),
             caustic_photons: self.caustic_photons.or(base.caustic_photons),
             caustic_neighbors: self.caustic_neighbors.unwrap_or(base.caustic_neighbors),
             radiance: self.radiance,
         }
-    }
-}
-
-fn max_distance(text: &str) -> Result<MaxDistance, String> {
-    match text.parse() {
-        _ if text == "auto" => Ok(MaxDistance::Auto),
-        Ok(distance) if f32::is_finite(distance) && distance > 0.0 => Ok(MaxDistance::Metres(distance)),
-        _ => Err("a greatest distance is a positive number of metres, or auto".into()),
     }
 }

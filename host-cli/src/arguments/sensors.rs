@@ -4,6 +4,7 @@ use clap::Args;
 use photoncard_driver::render::{Integrator, PhotonMaps, RenderSettings};
 
 use super::cards::CardOptions;
+use super::distance::Distance;
 use super::schedule::ScheduleOptions;
 
 #[derive(Args)]
@@ -36,6 +37,19 @@ pub(crate) struct SensorOptions {
     /// Shadow rays per sample
     #[arg(long, default_value_t = 32, allow_negative_numbers = true)]
     shadow_rays: u32,
+    /// Length below which a gather ray goes on from its end, metres, or auto: derived from the density of the
+    /// photons
+    ///
+    /// With 0, every gather ray ends in a photon gather: photons from outside light narrow gaps.
+    #[arg(
+        long,
+        value_name = "METRES|auto",
+        default_value = "auto",
+        value_parser = Distance::near,
+        allow_negative_numbers = true,
+        hide_short_help = true
+    )]
+    near_distance: Distance,
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]
     seed: u32,
@@ -44,7 +58,8 @@ pub(crate) struct SensorOptions {
 impl SensorOptions {
     /// Settings of a measurement.
     pub(super) fn settings(&self, schedule: &ScheduleOptions, cards: &CardOptions) -> RenderSettings {
-        let Self { photons, neighbors, caustic_photons, spp, gather_rays, shadow_rays, seed } = *self;
+        let Self { photons, neighbors, caustic_photons, spp, gather_rays, shadow_rays, near_distance, seed } =
+            *self;
         RenderSettings {
             photons: PhotonMaps {
                 count: photons,
@@ -52,7 +67,14 @@ impl SensorOptions {
                 caustic_photons: Some(caustic_photons),
                 ..PhotonMaps::default()
             },
-            integrator: Integrator { seed, samples: spp, gather_rays, shadow_rays, ..Integrator::default() },
+            integrator: Integrator {
+                seed,
+                samples: spp,
+                gather_rays,
+                shadow_rays,
+                near_distance: near_distance.stated(),
+                ..Integrator::default()
+            },
             schedule: schedule.settings(),
             cards: cards.settings(),
             ..RenderSettings::default()

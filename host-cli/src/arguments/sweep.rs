@@ -100,7 +100,7 @@ impl SweepArguments {
     pub(crate) fn point(&self, name: &str, model: &ChipModel) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, caches, card: _, machine: _ } =
             &self.settings;
-        let base = quality.settings();
+        let base = quality.settings().with(|s| s.integrator.near_distance = Some(0.0));
         let settings = RenderSettings {
             picture: picture.settings(&base.picture),
             photons: photons.settings(&base.photons),

@@ -13,8 +13,8 @@ use super::{files, messages};
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 use crate::picture_files::{denoised_by, denoiser};
 
-/// Settings that a render computes if they are not stated, and then writes into the provenance.
-const FOUND: [&str; 2] = ["max-distance", "view"];
+/// Setting that a render computes, and then writes into the provenance.
+const FOUND: &str = "view";
 
 /// Returns whether `--resume` is given and all files of this frame exist.
 pub(super) fn may_be(outputs: &OutputOptions) -> bool {
@@ -42,10 +42,9 @@ pub(super) fn is_finished(
         Ok(denoiser) => stated.extend(denoiser.map(denoised_by)),
         Err(_) => return false,
     }
-    let found: Vec<&str> =
-        FOUND.into_iter().filter(|name| stated.get(*name).is_none_or(Value::is_null)).collect();
     let without_found = |mut settings: NamedSettings| {
-        found.iter().for_each(|name| drop(settings.remove(*name)));
+        // A setting that is not stated is null, and `auto` with the value in use in the provenance.
+        settings.retain(|name, value| name != FOUND && !value.is_null() && value.get("auto").is_none());
         // Settings are compared as text, in which a number has the form that it has in a file.
         serde_json::to_string(&settings).ok()
     };

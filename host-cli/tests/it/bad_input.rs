@@ -143,6 +143,8 @@ fn numbers_out_of_range_are_refused() {
         ("--gather-rays", "4294967295", ["0 to", "or less"]),
         ("--max-distance", "-1", ["positive number", "auto"]),
         ("--max-distance", "nan", ["positive number", "auto"]),
+        ("--near-distance", "-1", ["0 or more", "auto"]),
+        ("--near-distance", "inf", ["0 or more", "auto"]),
         ("--threads", "0", ["1 to 1024", "leave the option out"]),
         ("--threads", "100000", ["1 to 1024", "leave the option out"]),
         ("--seed", "-1", ["--seed", "invalid"]),
@@ -288,6 +290,7 @@ fn settings_beyond_every_card_are_refused_before_one_is_reached() {
         ("--bins", "0"),
         ("--ic-error", "2"),
         ("--max-distance", "-1"),
+        ("--near-distance", "-1"),
         ("--verify", "2"),
     ] {
         // No card listens at this address: an error about the card would mean that the value was accepted.

@@ -44,6 +44,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--caustic-photons", "90"], "caustic-photons", json!(90)),
         (&["--caustic-neighbors", "9"], "caustic-neighbors", json!(9)),
         (&["--max-distance", "0.5"], "max-distance", json!(0.5)),
+        (&["--near-distance", "0.25"], "near-distance", json!(0.25_f32)),
         (&["--radiance", "precomputed"], "radiance", json!("precomputed")),
         (&["--gather-rays", "5"], "gather-rays", json!(5)),
         (&["--shadow-rays", "2"], "shadow-rays", json!(2)),

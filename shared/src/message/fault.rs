@@ -163,11 +163,13 @@ pub enum Parameter {
     LightGroups,
     /// Whiteness of the surfaces that eye rays meet first.
     Irradiance,
+    /// Length below which gather rays go on.
+    NearDistance,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -197,6 +199,7 @@ impl Parameter {
         Self::Identities,
         Self::LightGroups,
         Self::Irradiance,
+        Self::NearDistance,
     ];
 
     /// Returns the fault that reports that the card cannot render with the parameter's value.
@@ -236,6 +239,7 @@ impl Parameter {
             Self::Identities => "coverage by identity",
             Self::LightGroups => "light groups",
             Self::Irradiance => "whiteness of the surfaces that eye rays meet first",
+            Self::NearDistance => "length below which gather rays go on",
         }
     }
 }

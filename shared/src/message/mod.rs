@@ -41,7 +41,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol that this module, [`crate::transport`] and [`crate::frame`] define.
-pub const PROTOCOL_VERSION: u16 = 17;
+pub const PROTOCOL_VERSION: u16 = 18;
 
 /// Maximum number of lines in one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -259,6 +259,9 @@ pub struct FrameParameters {
     /// and the environment behind the scene as black. The light of a pixel is then `E / pi`, of the
     /// irradiance `E` on the surface, W/m^2.
     pub irradiance: bool,
+    /// Length below which a gather ray goes on from its end, metres, finite and at least 0. Photons are
+    /// gathered at the end of its first continuation that is longer, or of the eighth.
+    pub near_distance: f32,
 }
 
 /// Maximum number of paths per sample in adaptive sampling.

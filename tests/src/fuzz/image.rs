@@ -3,7 +3,9 @@
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
-use photoncard_driver::photon_map::{map_photons, precompute_irradiance, store_photons, to_kd_tree};
+use photoncard_driver::photon_map::{
+    GatherParameters, map_photons, precompute_irradiance, store_photons, to_kd_tree,
+};
 use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::Material;
 use photoncard_shared::address::{LINE_BYTES, Line};
@@ -65,6 +67,11 @@ pub fn frame(choice: u8) -> FrameParameters {
         ..RenderSettings::default()
     };
     let is_set = |bit: u8| choice >> bit & 1 != 0;
+    let gathers = GatherParameters {
+        max_distance: 0.5,
+        near_distance: if is_set(2) { 0.4 } else { 0.0 },
+        caustics: choice.is_multiple_of(3).then_some(CausticGather { neighbors: 10, max_distance: 0.3 }),
+    };
     FrameParameters {
         neighbors: 20,
         gather_rays: 8,
@@ -77,10 +84,9 @@ pub fn frame(choice: u8) -> FrameParameters {
         drain: [Drain::Immediate, Drain::Hash, Drain::Sort, Drain::Buckets][usize::from(choice >> 5 & 3)],
         filter: [Filter::Box, Filter::Gaussian, Filter::BlackmanHarris][usize::from(choice % 3)],
         queue: if is_set(7) { 3 } else { 64 },
-        caustics: choice.is_multiple_of(3).then_some(CausticGather { neighbors: 10, max_distance: 0.3 }),
         layers: choice.count_ones() % 2 == 1,
         radiance: if choice >> 4 & 3 == 3 { Radiance::Precomputed } else { Radiance::Density },
-        ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
+        ..settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), &gathers)
     }
 }
 

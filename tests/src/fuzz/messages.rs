@@ -50,6 +50,7 @@ pub(super) fn frame() -> FrameParameters {
         coverage: false,
         identities: false,
         irradiance: false,
+        near_distance: 0.25,
     }
 }
 

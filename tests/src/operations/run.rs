@@ -40,7 +40,7 @@ impl Run {
         let packed = PackedScene::new(&scene).expect("it is packed");
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("it is lit");
         let camera = settings.camera(&scene).expect("it has a camera");
-        let frame = settings.frame(&camera, mapped.max_distance, mapped.caustics);
+        let frame = settings.frame(&camera, &mapped.gathers);
         let all = tiles(settings.window(), settings.tile_side(&[REFERENCE]), settings.schedule.order);
         let step = (all.len() / count).max(1);
         let chosen: Vec<_> = all.iter().skip(step / 2).step_by(step).copied().collect();

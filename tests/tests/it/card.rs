@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon::trace;
-use photoncard_driver::photon_map::store_photons;
+use photoncard_driver::photon_map::{GatherParameters, store_photons};
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_firmware::kind::{Large, MICRO};
 use photoncard_shared::address::Line;
@@ -38,7 +38,7 @@ fn frame() -> FrameParameters {
         integrator: Integrator { gather_rays: 8, ..Integrator::default() },
         ..RenderSettings::default()
     };
-    settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)
+    settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), &GatherParameters::within(0.5))
 }
 
 const TILE: Tile = Tile { id: 7, x: 0, y: 0, width: 8, height: 8 };

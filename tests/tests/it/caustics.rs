@@ -125,8 +125,8 @@ fn caustic_map() -> (CardImage, f32) {
         radiance: Radiance::Density,
     };
     let packed = PackedScene::new(&two_balls()).expect("packs");
-    let MappedImage { image, caustics, .. } = map_photons(packed, &settings, &|_| true).expect("maps");
-    (image, caustics.expect("there are caustics").max_distance)
+    let MappedImage { image, gathers, .. } = map_photons(packed, &settings, &|_| true).expect("maps");
+    (image, gathers.caustics.expect("there are caustics").max_distance)
 }
 
 /// Caustics on a white surface at `position`, and the number of lines that the search has read.

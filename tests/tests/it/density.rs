@@ -40,7 +40,8 @@ impl Map {
             layout: PhotonLayout::Jensen,
             radiance: Radiance::Density,
         };
-        let MappedImage { image, max_distance, .. } = map_photons(packed, &settings, &|_| true).unwrap();
+        let MappedImage { image, gathers, .. } = map_photons(packed, &settings, &|_| true).unwrap();
+        let max_distance = gathers.max_distance;
         let mut buffer = CandidateBuffer::<512>::new();
         let mut nearest = NearestPhotons::new(buffer.view(), NEIGHBORS, max_distance);
         let (header, mut memory) = image.view();

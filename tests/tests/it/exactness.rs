@@ -430,7 +430,7 @@ fn gathers_along_one_curve_through_a_frame_bring_the_light_of_any_order() {
             s.integrator.irradiance_error = irradiance_error;
             s.picture.layers = layers;
         });
-        let frame = settings.frame(&settings.camera(&scene).unwrap(), mapped.max_distance, mapped.caustics);
+        let frame = settings.frame(&settings.camera(&scene).unwrap(), &mapped.gathers);
         let tiles = tiles(settings.window(), 7, GatherOrder::Sort);
         let (image, frame) = (&mapped.image, &frame);
         let whole =

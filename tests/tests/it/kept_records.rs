@@ -48,11 +48,11 @@ impl World {
         });
         let packed = PackedScene::new(&scene).expect("packs");
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
-        let MappedImage { image, max_distance, caustics, .. } = mapped;
+        let MappedImage { image, gathers, .. } = mapped;
         let camera = settings.camera(&scene).expect("a camera");
         let tiles = tiles(settings.window(), settings.tile_side(&[MICRO]), settings.schedule.order);
         let (scene, _) = image.view();
-        let frame = settings.frame(&camera, max_distance, caustics);
+        let frame = settings.frame(&camera, &gathers);
         Self { scene, image: image.lines().to_vec(), frame, tiles }
     }
 

@@ -33,6 +33,7 @@ mod lights;
 mod long_paths;
 mod measured_tables;
 mod memory;
+mod near_ends;
 mod nearest_photons;
 mod normal_maps;
 mod operations;

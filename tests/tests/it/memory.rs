@@ -60,7 +60,7 @@ impl Frame {
         let scene = glossy();
         let packed = PackedScene::new(&scene).unwrap();
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).unwrap();
-        let frame = settings.frame(scene.camera(None).unwrap(), mapped.max_distance, mapped.caustics);
+        let frame = settings.frame(scene.camera(None).unwrap(), &mapped.gathers);
         Self {
             mapped,
             frame,

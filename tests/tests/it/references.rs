@@ -60,36 +60,29 @@ fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");
 }
 
-/// Checks a scene with default settings, with importance sampling and irradiance records, and with
-/// precomputed irradiance.
+/// Checks a scene without importance sampling of photons, with importance sampling and irradiance records,
+/// with precomputed irradiance, and with gather rays that all go on.
 fn check(scene: &str, reference: &str) {
-    check_with(scene, reference, Sampling::Reflection, None, Radiance::Density);
-    check_with(scene, reference, Sampling::Product, Some(0.025), Radiance::Density);
-    check_with(scene, reference, Sampling::Product, None, Radiance::Precomputed);
+    check_with(scene, reference, |s| s.integrator.sampling = Sampling::Reflection);
+    check_with(scene, reference, |s| {
+        (s.integrator.irradiance_error, s.integrator.gather_rays) = (Some(0.025), 256);
+    });
+    check_with(scene, reference, |s| s.photons.radiance = Radiance::Precomputed);
+    check_with(scene, reference, |s| {
+        (s.integrator.sampling, s.integrator.near_distance) = (Sampling::Reflection, Some(1e3));
+    });
 }
 
-fn check_with(
-    scene: &str,
-    reference: &str,
-    sampling: Sampling,
-    irradiance_error: Option<f32>,
-    radiance: Radiance,
-) {
+fn check_with(scene: &str, reference: &str, change: impl FnOnce(&mut RenderSettings)) {
     let scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let settings = RenderSettings {
         picture: Picture { width: 64, height: 64, ..Picture::default() },
-        photons: PhotonMaps { count: 150_000, radiance, ..PhotonMaps::default() },
-        integrator: Integrator {
-            gather_rays: if irradiance_error.is_some() { 256 } else { 32 },
-            samples: 8,
-            sampling,
-            irradiance_error,
-            ..Integrator::default()
-        },
+        photons: PhotonMaps { count: 150_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 32, samples: 8, ..Integrator::default() },
         cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
-    let film = render_or_panic(&scene, &settings).film;
+    let film = render_or_panic(&scene, &settings.with(change)).film;
     compare(&film, &read(reference), [0.015, 0.05]);
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
-use photoncard_driver::photon_map::store_photons;
+use photoncard_driver::photon_map::{GatherParameters, store_photons};
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
@@ -122,9 +122,13 @@ fn a_card_polls_its_link_however_many_samples_a_pixel_has() {
             integrator: Integrator { gather_rays: 8, ..Integrator::default() },
             ..RenderSettings::default()
         };
-        let frame = settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None);
-        let few = most_reads(&FrameParameters { samples: 64, ..frame });
-        let many = most_reads(&FrameParameters { samples: MICRO.samples, ..frame });
-        assert!(many <= 2 * few, "{many} lines at once, not {few}");
+        let frame =
+            settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), &GatherParameters::within(0.5));
+        for near_distance in [0.0, 1e3] {
+            let frame = FrameParameters { near_distance, ..frame };
+            let few = most_reads(&FrameParameters { samples: 64, ..frame });
+            let many = most_reads(&FrameParameters { samples: MICRO.samples, ..frame });
+            assert!(many <= 2 * few, "{many} lines at once, not {few}");
+        }
     });
 }

@@ -111,6 +111,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             sampling: Pixels = Sampling::Reflection,
             irradiance_error: Pixels = Some(0.5),
             adaptive_threshold: Pixels = Some(0.1),
+            near_distance: Pixels = Some(0.3),
         }
         schedule: Schedule {
             tile: Work = Some(5),

@@ -74,9 +74,9 @@ impl World {
         };
         let packed = pack(&scene).expect("packs");
         let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
-        let MappedImage { image, max_distance, caustics, .. } = mapped;
+        let MappedImage { image, gathers, .. } = mapped;
         let camera = settings.camera(&scene).expect("a camera");
-        let frame = settings.frame(&camera, max_distance, caustics);
+        let frame = settings.frame(&camera, &gathers);
         Self { scene: image.view().0, image: image.lines().to_vec(), frame, settings }
     }
 

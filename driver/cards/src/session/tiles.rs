@@ -163,6 +163,7 @@ mod tests {
             coverage: false,
             identities: false,
             irradiance: false,
+            near_distance: 0.0,
         }
     }
 

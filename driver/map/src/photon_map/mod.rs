@@ -22,6 +22,7 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::{Camera, CausticGather, Radiance};
+use serde::{Deserialize, Serialize};
 
 pub use self::budget::{check_image, check_packed};
 pub use self::irradiance::precompute_irradiance;
@@ -41,20 +42,44 @@ use crate::photon::{
 /// visible.
 const MIN_CELLS: f32 = 8.0;
 
+/// Length of the gather rays that go on, divided by the usual radius of a gather. In a gap that is narrower
+/// than this radius, few rays are longer, and photons from outside the gap light their ends.
+const NEAR: f32 = 4.0;
+/// Diagonal of the scene divided by the maximum length of the gather rays that go on. Where photons are
+/// sparse, most rays would go on without this limit.
+const LEAST_FAR_RAYS: f32 = 16.0;
+
 /// Card image with its photon map, ready for gathers.
 pub struct MappedImage {
     /// Card image with the photon map.
     pub image: CardImage,
-    /// Maximum distance of a gather, metres.
-    pub max_distance: f32,
-    /// Parameters of gathers in the caustic map; `None` without a caustic map.
-    pub caustics: Option<CausticGather>,
+    /// Parameters of gathers in the maps.
+    pub gathers: GatherParameters,
     /// Number of paths traced from the lights.
     pub paths: u64,
     /// Statistics of the guiding of the paths; `None` if photons are for any camera.
     pub guiding: Option<Guiding>,
     /// Time of each step of the photon pass.
     pub times: PhotonTimes,
+}
+
+/// Parameters of gathers that follow from the photons.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GatherParameters {
+    /// Maximum distance of a gather, metres.
+    pub max_distance: f32,
+    /// Length below which gather rays go on unless settings state one, metres; 0 for none.
+    pub near_distance: f32,
+    /// Parameters of gathers in the caustic map; `None` without a caustic map.
+    pub caustics: Option<CausticGather>,
+}
+
+impl GatherParameters {
+    /// Gathers within `max_distance` metres at the end of every gather ray, without a caustic map.
+    pub fn within(max_distance: f32) -> Self {
+        Self { max_distance, near_distance: 0.0, caustics: None }
+    }
 }
 
 /// Time of each step of the photon pass.
@@ -144,6 +169,8 @@ pub fn map_traced(
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<MappedImage, PhotonError> {
     let TracedPhotons { mut photons, paths, guiding, caustic, importons } = traced;
+    let has_punctual_caustics =
+        packed.radiance_of_caustics().is_some_and(|radiance| radiance.mean.is_infinite());
     let mut times = PhotonTimes::default();
     let start = Instant::now();
     let cell = photons.grid().cell;
@@ -189,7 +216,14 @@ pub fn map_traced(
         image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
         times.estimating = start.elapsed();
     }
-    Ok(MappedImage { image, max_distance, caustics, paths, guiding, times })
+    // Without a caustic map, photons alone bring the caustics of lights that no ray can hit.
+    let near_distance = if caustics.is_none() && has_punctual_caustics {
+        0.0
+    } else {
+        (NEAR * distances.usual).min(image.diagonal() / LEAST_FAR_RAYS)
+    };
+    let gathers = GatherParameters { max_distance, near_distance, caustics };
+    Ok(MappedImage { image, gathers, paths, guiding, times })
 }
 
 /// Importons of the camera for which photons are traced; `None` for any camera.

@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use photoncard_map::pack::CardImage;
-use photoncard_map::photon_map::PhotonsFor;
+use photoncard_map::photon_map::{GatherParameters, PhotonsFor};
 use photoncard_picture::cryptomatte::Identities;
 use photoncard_scene::{Camera, Lens, LightGroups, Projection, Scene};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::Checksum;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::message::CausticGather;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -37,8 +36,7 @@ pub(super) struct Head {
     is_in_watts: bool,
     photons: PhotonMaps,
     integrator: Integrator,
-    max_distance: f32,
-    caustics: Option<CausticGather>,
+    gathers: GatherParameters,
     paths: u64,
     /// Names of the card image's identities, and the checksum of the scene's objects; left out for an image
     /// without identities.
@@ -55,7 +53,7 @@ pub(super) struct Head {
 impl Head {
     pub(super) fn new(scene: &PreparedScene) -> Self {
         let PreparedScene { scene, photons, integrator, kept, frames, notes } = scene;
-        let Prepared { image, identities, max_distance, caustics, paths, guiding: _ } = &kept.prepared;
+        let Prepared { image, identities, gathers, paths, guiding: _ } = &kept.prepared;
         Self {
             program: PROGRAM.to_owned(),
             lines: image.lines().len() as u32,
@@ -67,8 +65,7 @@ impl Head {
             is_in_watts: scene.is_in_watts,
             photons: photons.clone(),
             integrator: integrator.clone(),
-            max_distance: *max_distance,
-            caustics: *caustics,
+            gathers: *gathers,
             paths: *paths,
             identities: identities
                 .as_deref()
@@ -89,8 +86,7 @@ impl Head {
             offset,
             photons,
             integrator,
-            max_distance,
-            caustics,
+            gathers,
             paths,
             identities,
             light_groups,
@@ -103,8 +99,10 @@ impl Head {
             return Err("its card image has identities without names, or there are names without identities");
         }
         let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
+        let GatherParameters { max_distance, near_distance, caustics } = gathers;
         let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
-        if !distances.into_iter().flatten().all(is_distance) {
+        let is_near = near_distance.is_finite() && near_distance >= 0.0;
+        if !is_near || !distances.into_iter().flatten().all(is_distance) {
             return Err("its distances of gathers are none");
         }
         if photons.photons_for != PhotonsFor::Scene {
@@ -123,7 +121,7 @@ impl Head {
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
         let (names, objects) = identities.unzip();
         let (image, identities) = (Arc::new(image), names.map(Arc::new));
-        let prepared = Prepared { image, identities, max_distance, caustics, paths, guiding: None };
+        let prepared = Prepared { image, identities, gathers, paths, guiding: None };
         let [checksum, without_cameras] = self.scene;
         let checksums = [checksum, without_cameras, objects.unwrap_or_default()];
         if !LightGroups::are_names(&light_groups) {

@@ -126,7 +126,9 @@ impl Quality {
 
     /// Settings like [`Self::settings`], but for a picture with the finish `finish`.
     pub fn settings_for(self, finish: Finish) -> RenderSettings {
-        let Some(level) = self.level(finish) else { return RenderSettings::default() };
+        let Some(level) = self.level(finish) else {
+            return RenderSettings::default().with(|s| s.integrator.near_distance = Some(0.0));
+        };
         let samples = *level.samples.start();
         let rays = middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize) as u32;
         let gather_rays = if level.irradiance_error.is_some() { rays } else { rays.div_ceil(samples) };

@@ -6,7 +6,9 @@ use glam::Vec3;
 use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::{PackedScene, SourceRadiance};
 use photoncard_map::photon;
-use photoncard_map::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
+use photoncard_map::photon_map::{
+    GatherParameters, MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced,
+};
 use photoncard_picture::film::Window;
 use photoncard_picture::sums::SumFormat;
 use photoncard_scene::Scene;
@@ -373,10 +375,13 @@ impl<'a> Pilot<'a> {
 
     fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
-        let max_distance = self.mapped.max_distance;
+        let GatherParameters { max_distance, .. } = self.mapped.gathers;
         let neighbors = settings.photons.caustic_neighbors;
         let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
-        let frame = settings.frame(&camera, max_distance, caustics);
+        // The pilot measures the errors of gathers and of single rays: all gather rays end at their surfaces.
+        let gathers = GatherParameters { caustics, ..GatherParameters::within(max_distance) };
+        let settings = settings.clone().with(|settings| settings.integrator.near_distance = None);
+        let frame = settings.frame(&camera, &gathers);
         // The pilot reads the light of all groups alone, and its card image may have no identities.
         Ok(FrameParameters { position: false, coverage: false, identities: false, light_groups: 0, ..frame })
     }

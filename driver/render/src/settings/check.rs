@@ -42,6 +42,7 @@ impl RenderSettings {
         self.check_illuminance()?;
         self.check_irradiance_error()?;
         self.check_max_distance()?;
+        self.check_near_distance()?;
         self.check_adaptive_threshold()?;
         check_chips(self.cards.addresses.iter().map(CardAddress::emulated_chips).sum())?;
         self.check_trace()?;
@@ -219,6 +220,19 @@ impl RenderSettings {
                 value: distance.to_string(),
                 reason: "a distance is a positive number of metres".into(),
                 remedy: "give a positive number, or `auto`".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that the length below which gather rays go on is valid, if it is stated.
+    fn check_near_distance(&self) -> Result<(), RenderError> {
+        match self.integrator.near_distance {
+            Some(distance) if !(distance.is_finite() && distance >= 0.0) => Err(RenderError::Setting {
+                field: "integrator.near_distance",
+                value: distance.to_string(),
+                reason: "a distance is a number of metres, 0 or more".into(),
+                remedy: "give 0, a positive number, or `auto`".into(),
             }),
             _ => Ok(()),
         }

@@ -274,6 +274,9 @@ pub struct Integrator {
     /// with the standard deviation of a pixel's probes, divided by the square root of their mean. If this
     /// quotient is greater, the samples after the probes are means of several paths.
     pub adaptive_threshold: Option<f32>,
+    /// Length below which a gather ray goes on from its end, metres; 0 for none, `None` to derive it from the
+    /// density of the photons.
+    pub near_distance: Option<f32>,
 }
 
 impl Integrator {
@@ -292,6 +295,7 @@ impl Integrator {
             sampling,
             irradiance_error,
             adaptive_threshold,
+            near_distance,
         } = self;
         // Rays are divided among the planned samples with the irradiance cache alone.
         let is_planned = irradiance_error.is_some() && self.planned() != *samples;
@@ -310,6 +314,7 @@ impl Integrator {
             setting(Pixels, "integrator.irradiance_error", "ic-error", optional(*irradiance_error)),
             setting(Pixels, "integrator.irradiance_error", "irradiance-cache", cache),
             setting(Pixels, "integrator.adaptive_threshold", "adaptive", adaptive),
+            setting(Pixels, "integrator.near_distance", "near-distance", optional(*near_distance)),
         ]
     }
 }
@@ -325,6 +330,7 @@ impl Default for Integrator {
             sampling: Sampling::Product,
             irradiance_error: None,
             adaptive_threshold: None,
+            near_distance: None,
         }
     }
 }

@@ -9,14 +9,14 @@ mod setting;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
 use photoncard_firmware::importance::ENTRIES;
 use photoncard_shared::budget::Budget;
-use photoncard_shared::message::{self, CausticGather, FrameParameters, PixelForm, SumScale, Tile};
+use photoncard_shared::message::{self, FrameParameters, PixelForm, SumScale, Tile};
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 pub use self::setting::{Changes, Setting};
 use crate::emulator::memory_model::CacheSettings;
 use photoncard_cards::scheduler::{GatherOrder, tiles};
-use photoncard_map::photon_map::{PhotonSettings, PhotonsFor};
+use photoncard_map::photon_map::{GatherParameters, PhotonSettings, PhotonsFor};
 use photoncard_picture::film::{Film, FilmError, Window};
 use photoncard_picture::sums::SumFormat;
 use photoncard_scene::{Camera, Scene};
@@ -180,12 +180,8 @@ impl RenderSettings {
     }
 
     /// Frame parameters for a camera of the scene.
-    pub fn frame(
-        &self,
-        camera: &Camera,
-        max_distance: f32,
-        caustics: Option<CausticGather>,
-    ) -> FrameParameters {
+    pub fn frame(&self, camera: &Camera, gathers: &GatherParameters) -> FrameParameters {
+        let GatherParameters { max_distance, near_distance, caustics } = *gathers;
         let PixelForm { layers, light_groups, position, coverage, identities } = self.picture.form();
         FrameParameters {
             width: self.picture.width,
@@ -217,6 +213,7 @@ impl RenderSettings {
             coverage,
             identities,
             irradiance: self.picture.irradiance,
+            near_distance: self.integrator.near_distance.unwrap_or(near_distance),
         }
     }
 }

@@ -203,7 +203,7 @@ impl Fixture {
             false => PackedScene::new(scene).unwrap(),
         };
         let mapped = map_photons(packed, &settings.photon_settings(scene), &|_| true).unwrap();
-        let frame = settings.frame(&scene.cameras[0], mapped.max_distance, mapped.caustics);
+        let frame = settings.frame(&scene.cameras[0], &mapped.gathers);
         let limits = PixelLimits::new(&mapped.image.view().0.header, &frame);
         let upload = Arc::new(Upload::new(Arc::new(mapped.image)));
         Self { scene: scene.clone(), settings, upload, limits, frame }

@@ -59,7 +59,7 @@ fn options(random: &mut Random) -> Vec<String> {
         options.insert(0, "--".into());
     }
     let mut named = vec![format!("--quality={quality}")];
-    let choices: [(&str, String); 15] = [
+    let choices: [(&str, String); 16] = [
         ("seed", random.below(1 << 32).to_string()),
         ("tile", (1 + random.below(64)).to_string()),
         ("spp", (1 + random.below(64)).to_string()),
@@ -69,6 +69,7 @@ fn options(random: &mut Random) -> Vec<String> {
         ("neighbors", (2 + random.below(200)).to_string()),
         ("caustic-photons", random.below(1 << 20).to_string()),
         ("max-distance", random.number(1e-3).abs().max(1e-9).to_string()),
+        ("near-distance", random.number(1e-3).abs().to_string()),
         ("irradiance-cache", random.one(&["on", "off"]).to_owned()),
         ("ic-error", (0.01 + random.number(0.005)).to_string()),
         ("sampling", random.one(Sampling::ALL).name().to_owned()),

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3, Vec4};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon::trace;
+use photoncard_driver::photon_map::GatherParameters;
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::{Camera, Material, Projection, Reflection, Scene, Transmission};
 use photoncard_firmware::memory::MemoryPort;
@@ -66,7 +67,7 @@ fn brought(packed: &PackedScene) -> f64 {
 fn found(packed: &PackedScene, view: &Camera) -> f64 {
     const PATHS: u32 = 700_000;
     const OF_A_TASK: u32 = 10_000;
-    let frame = RenderSettings::default().frame(view, 1.0, None);
+    let frame = RenderSettings::default().frame(view, &GatherParameters::within(1.0));
     let of_task = |task: u32| {
         let (image, mut memory) = packed.view();
         let mut counters = Counters::ZERO;
