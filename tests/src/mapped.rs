@@ -133,7 +133,9 @@ impl<'a> IndirectLight<'a> {
             for bundle in bundles(0..rays) {
                 cast(&mut context, &point, target, bundle, &mut ends).expect("sound");
                 for end in &ends {
-                    sum += end.reflected.total(LightGroups::ONE);
+                    if end.is_near {
+                        sum += end.light.total(LightGroups::ONE);
+                    }
                     if let Some(request) = &end.request {
                         let brought = gathered(&mut context, request, candidates.view()).expect("sound");
                         sum += brought.total(LightGroups::ONE);

@@ -217,10 +217,8 @@ impl<K: ChipKind> Flight<K> {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
                 let sum = (flight, number);
-                shared.sums.add(context.frame, sum, Component::Direct, &end.direct)?;
-                if !end.reflected.is_none() {
-                    shared.sums.add(context.frame, sum, Component::Indirect, &end.reflected)?;
-                }
+                let component = if end.is_near { Component::Indirect } else { Component::Direct };
+                shared.sums.add(context.frame, sum, component, &end.light)?;
                 match (end.request, outlet.as_deref_mut()) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),

@@ -111,10 +111,7 @@ impl<K: ChipKind> Flight<K> {
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
-                cache.add(record, end.cell, &end.direct)?;
-                if !end.reflected.is_none() {
-                    cache.add(record, end.cell, &end.reflected)?;
-                }
+                cache.add(record, end.cell, &end.light)?;
                 if let Some(request) = end.request {
                     match gathers.submit(context, rounds, request)? {
                         None => *waiting += 1,

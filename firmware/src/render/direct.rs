@@ -31,12 +31,12 @@ use photoncard_shared::message::{Fault, Invariant};
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::light_groups::{GroupedLight, LightGroups};
 use crate::memory::{MemoryPort, Stage};
-use crate::sampler::{Dimension, Pattern};
+use crate::sampler::Dimension;
 use crate::scene::light::{
     LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance,
     sample_light,
 };
-use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
+use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittance, transmittances};
 use crate::vector::max_component;
 
 /// Direct light that a gather point reflects, W/(sr m^2), by light group, estimated by shadow rays and
@@ -49,40 +49,18 @@ pub fn reflected<M: MemoryPort>(
     pixel: PixelSample,
     point: &GatherPoint,
 ) -> Result<GroupedLight, Fault> {
-    let (pattern, sample) = pixel.stratified(context.frame, Dimension::Emitter);
-    by_shadow_rays(context, point, (pattern, sample))
-}
-
-/// Direct light that the near end of a gather ray reflects, W/(sr m^2), by light group, estimated by one
-/// shadow ray and weighted against the gather ray that goes on.
-///
-/// # Errors
-/// If the card image is invalid.
-pub fn reflected_by_one<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-) -> Result<GroupedLight, Fault> {
-    by_shadow_rays(context, point, (point.pattern, 0))
-}
-
-/// Direct light by the shadow rays of a point: those of sample `sample` among all that have the pattern.
-#[inline(never)]
-fn by_shadow_rays<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-    (pattern, sample): (Pattern, u32),
-) -> Result<GroupedLight, Fault> {
-    let shadow_rays = point.shadow_rays(context.frame);
-    if point.surface.reflection.is_black() || shadow_rays == 0 {
+    if point.surface.reflection.is_black() || context.frame.shadow_rays == 0 {
         return Ok(GroupedLight::NONE);
     }
     context.memory.enter(Stage::Shadow);
+    let frame = context.frame;
+    let (pattern, sample) = pixel.stratified(frame, Dimension::Emitter);
     let receiver = Receiver::new(&point.surface);
     let mut choices = LightChoices::new(receiver);
     let mut sum = GroupedLight::NONE;
     let mut rays = ShadowRays::new();
-    for index in 0..shadow_rays {
-        let index = sample.wrapping_mul(shadow_rays).wrapping_add(index);
+    for index in 0..frame.shadow_rays {
+        let index = sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
         let (place, dither) = (pattern.point(index), pattern.dither(index));
         let light = sample_light(context.scene, context.memory, &mut choices, place, dither)?;
         if let Some(light) = light
@@ -96,7 +74,33 @@ fn by_shadow_rays<M: MemoryPort>(
         }
     }
     rays.cast(context, point, &mut sum)?;
-    Ok(sum / shadow_rays as f32)
+    Ok(sum / frame.shadow_rays as f32)
+}
+
+/// Direct light that the near end of a gather ray reflects, W/(sr m^2), by light group, estimated by one
+/// shadow ray and weighted against the gather ray that goes on.
+///
+/// # Errors
+/// If the card image is invalid.
+#[inline(never)]
+pub fn reflected_at_near_end<M: MemoryPort>(
+    context: &mut Context<M>,
+    point: &GatherPoint,
+) -> Result<GroupedLight, Fault> {
+    context.memory.enter(Stage::Shadow);
+    let receiver = Receiver::new(&point.surface);
+    let mut choices = LightChoices::new(receiver);
+    let (place, dither) = (point.pattern.point(0), point.pattern.dither(0));
+    let light = sample_light(context.scene, context.memory, &mut choices, place, dither)?;
+    let meets = |light: &LightSample| {
+        point.surface.is_above(light.direction) && max_component(light.irradiance) > 0.0
+    };
+    let Some(light) = light.filter(meets) else { return Ok(GroupedLight::NONE) };
+    context.counters.shadow_rays += 1;
+    let ray = Ray::of_light(receiver.origin, light.direction, light.distance * SHORTER);
+    let share = transmittance(context.scene, context.memory, &ray)?;
+    let reflected = from_light(context, point, &light) * share;
+    Ok(LightGroups::of(context.frame).light(light.light_group, reflected))
 }
 
 /// Shadow rays of a point that are cast together, each with its light sample.

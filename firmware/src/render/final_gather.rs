@@ -26,12 +26,11 @@ use crate::scene::{BUNDLE_RAYS, PartialReflection, Ray, RayKind, Surface, closes
 pub struct GatherRayEnd {
     /// Cell of the gather point's hemisphere that contains the ray's direction.
     pub cell: u8,
-    /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units,
-    /// by light group.
-    pub direct: GroupedLight,
-    /// Light that the ends of the ray and of its continuations reflect, if they are near ([`near`]), in the
-    /// card image's radiance units, by light group.
-    pub reflected: GroupedLight,
+    /// Weighted light, in the card image's radiance units, by light group: emission of the surface or
+    /// environment that the ray hits, or light that a near end and those after it reflect ([`near`]).
+    pub light: GroupedLight,
+    /// True if `light` is that of near ends.
+    pub is_near: bool,
     /// Request for the photon gather at the end of the ray, or of its last continuation; `None` if no
     /// reflecting surface is there.
     pub request: Option<GatherRequest>,
@@ -81,11 +80,13 @@ pub fn cast<M: MemoryPort>(
         let Arrived { direct, reached } =
             arrive(context, point, (*index, sampled, weight), (ray, hit), &mut met)?;
         let (mut pattern, mut index) = (point.pattern, *index);
-        let mut reflected = GroupedLight::NONE;
+        let mut light = direct;
         let mut gathered = reached.map(|reached| reached.weight);
-        if let Some(Reached { weight, .. }) = reached.filter(|end| near::is_near(context.frame, end)) {
+        // One sum for both kinds of light: a ray that brings direct light ends where it meets a surface.
+        let is_near = direct.is_none() && reached.is_some_and(|end| near::is_near(context.frame, &end));
+        if is_near && let Some(Reached { weight, .. }) = reached {
             (pattern, index) = (pattern.of_continuations(index), 0);
-            gathered = near::follow(context, pattern, weight, &mut met, &mut reflected)?;
+            gathered = near::follow(context, pattern, weight, &mut met, &mut light)?;
         }
         let header = &context.scene.header;
         let request = gathered.map(|weight| GatherRequest {
@@ -98,11 +99,10 @@ pub fn cast<M: MemoryPort>(
             ),
             target: target.in_cell(sampled.cell),
         });
-        let end = GatherRayEnd { cell: sampled.cell, direct, reflected, request };
-        if request.is_none() && direct.is_none() && reflected.is_none() {
-            continue;
+        if request.is_some() || !light.is_none() {
+            let end = GatherRayEnd { cell: sampled.cell, light, is_near, request };
+            ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
         }
-        ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
     }
     Ok(())
 }

@@ -42,7 +42,7 @@ pub(super) fn follow<M: MemoryPort>(
 ) -> Result<Option<Vec3>, Fault> {
     for end in 0..MOST_ENDS {
         let point = GatherPoint::near(*met, pattern.of_continuations(end));
-        let light = direct::reflected_by_one(context, &point)?;
+        let light = direct::reflected_at_near_end(context, &point)?;
         *reflected += light * (weight * (1.0 / context.scene.header.radiance_unit));
         *reflected += caustic::reflected(context, &point)? * weight;
         context.memory.enter(Stage::GatherRay);
