@@ -118,10 +118,13 @@ impl CardBoard {
     }
 
     /// Counts a tile that a card rendered. Returns the card's index, and whether this tile makes the card
-    /// ready.
+    /// ready. A lent card that has gone stays gone.
     pub(super) fn rendered(&mut self, name: &str) -> (u32, bool) {
         let Some((number, card)) = self.of_name(name) else { return (0, false) };
         card.tiles += 1;
+        if card.standing == Standing::Gone {
+            return (number as u32, false);
+        }
         card.error = None;
         card.pause = FIRST_PAUSE;
         let is_new = std::mem::replace(&mut card.standing, Standing::Ready) != Standing::Ready;
@@ -129,7 +132,7 @@ impl CardBoard {
     }
 
     pub(super) fn lose(&mut self, name: &str, error: String, now: Duration) {
-        if let Some((_, card)) = self.of_name(name) {
+        if let Some((_, card)) = self.of_name(name).filter(|(_, card)| card.standing != Standing::Gone) {
             (card.standing, card.error) = (Standing::Lost, Some(error));
             card.try_at = now + card.pause;
         }
@@ -183,6 +186,12 @@ mod tests {
         board.borrow(&b);
         assert_eq!((board.rendered("a"), board.rendered("b")), ((2, false), (3, false)));
         board.leave(&a);
+        // What the last pass still says of it does not bring it back.
+        board.lose("a", "the link has ended".into(), Duration::ZERO);
+        assert_eq!(
+            (board.rendered("a"), board.describe()["cards"][2]["state"].as_str()),
+            ((2, false), Some("gone"))
+        );
         assert_eq!((board.rendered("b").0, board.tiles_of(&b), board.tiles_of(&a)), (3, Some(2), None));
         board.borrow(&c);
         assert_eq!(board.rendered("c").0, 2);
