@@ -12,7 +12,8 @@ pub struct Counters {
     /// Eye rays. A path of a pixel without gather rays takes one. A path of a pixel with gather rays takes at
     /// least two: one to place its gather point, one to complete the pixel. If the gather point is seen in a
     /// mirror or through glass, the path is also traced again for the point's shadow rays, and for each group
-    /// of up to 64 of its gather rays. A survey takes one for each lattice point that it visits.
+    /// of up to 64 of its gather rays, or 16 in a frame with near ends. A survey takes one for each lattice
+    /// point that it visits.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,

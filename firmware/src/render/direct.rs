@@ -99,6 +99,9 @@ pub fn reflected_at_near_end<M: MemoryPort>(
     context.counters.shadow_rays += 1;
     let ray = Ray::of_light(receiver.origin, light.direction, light.distance * SHORTER);
     let share = transmittance(context.scene, context.memory, &ray)?;
+    if share == Vec3::ZERO {
+        return Ok(GroupedLight::NONE);
+    }
     let reflected = from_light(context, point, &light) * share;
     Ok(LightGroups::of(context.frame).light(light.light_group, reflected))
 }

@@ -83,8 +83,8 @@ pub fn cast<M: MemoryPort>(
         let mut light = direct;
         let mut gathered = reached.map(|reached| reached.weight);
         // One sum for both kinds of light: a ray that brings direct light ends where it meets a surface.
-        let is_near = direct.is_none() && reached.is_some_and(|end| near::is_near(context.frame, &end));
-        if is_near && let Some(Reached { weight, .. }) = reached {
+        let near = reached.filter(|end| direct.is_none() && near::is_near(context.frame, end));
+        if let Some(Reached { weight, .. }) = near {
             (pattern, index) = (pattern.of_continuations(index), 0);
             gathered = near::follow(context, pattern, weight, &mut met, &mut light)?;
         }
@@ -100,7 +100,7 @@ pub fn cast<M: MemoryPort>(
             target: target.in_cell(sampled.cell),
         });
         if request.is_some() || !light.is_none() {
-            let end = GatherRayEnd { cell: sampled.cell, light, is_near, request };
+            let end = GatherRayEnd { cell: sampled.cell, light, is_near: near.is_some(), request };
             ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
         }
     }

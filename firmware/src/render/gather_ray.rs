@@ -13,7 +13,8 @@ use crate::scene::{Detail, Hit, Ray, Reflector, Surface, read_surface_with};
 
 /// What a gather ray finds.
 pub(super) struct Arrived {
-    /// Weighted emission, in the card image's radiance units.
+    /// Weighted emission, and light of punctual lights that narrow lobes on the way reflect, in the card
+    /// image's radiance units.
     pub(super) direct: GroupedLight,
     /// End at a reflecting surface; `None` without one.
     pub(super) reached: Option<Reached>,

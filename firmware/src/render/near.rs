@@ -25,10 +25,9 @@ pub(super) fn is_near(frame: &FrameParameters, end: &Reached) -> bool {
 }
 
 /// Follows a gather ray from its near end `met`. `weight` is the weight of the light that `met` reflects, and
-/// `pattern` that of the ray's continuations.
-/// Adds the light that near ends reflect, without the light of photons, to `reflected`, in the card image's
-/// radiance units. Replaces `met` by the end of the last continuation, and returns the weight of its light;
-/// `None` if no surface is there.
+/// `pattern` that of the ray's continuations. Adds the light that near ends reflect, without the light of
+/// photons, to `reflected`, in the card image's radiance units. Replaces `met` by the end of the last
+/// continuation, and returns the weight of its light; `None` if no surface is there.
 ///
 /// # Errors
 /// If the card image is invalid.

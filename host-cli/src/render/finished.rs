@@ -43,8 +43,11 @@ pub(super) fn is_finished(
         Err(_) => return false,
     }
     let without_found = |mut settings: NamedSettings| {
-        // A setting that is not stated is null, and `auto` with the value in use in the provenance.
-        settings.retain(|name, value| name != FOUND && !value.is_null() && value.get("auto").is_none());
+        settings.remove(FOUND);
+        // A distance that is not stated is null, and `auto` with the value in use in the provenance.
+        for value in settings.values_mut().filter(|value| value.get("auto").is_some()) {
+            *value = Value::Null;
+        }
         // Settings are compared as text, in which a number has the form that it has in a file.
         serde_json::to_string(&settings).ok()
     };

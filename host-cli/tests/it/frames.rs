@@ -226,6 +226,7 @@ fn a_resumed_sequence_renders_unfinished_frames() {
         &["--fps", "25"],
         &["--seed", "1"],
         &["--max-distance", "0.3"],
+        &[],
         &["--near-distance", "0.3"],
         &[],
         &["--sample-type", "half"],

@@ -260,7 +260,8 @@ pub struct FrameParameters {
     /// irradiance `E` on the surface, W/m^2.
     pub irradiance: bool,
     /// Length below which a gather ray goes on from its end, metres, finite and at least 0. Photons are
-    /// gathered at the end of its first continuation that is longer, or of the eighth.
+    /// gathered at the end of its first continuation that is longer, or of the eighth. A ray that itself
+    /// brings light, of an emitter or of a punctual light by narrow lobes, ends there.
     pub near_distance: f32,
 }
 

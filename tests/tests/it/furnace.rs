@@ -65,15 +65,6 @@ fn a_diffuse_furnace_has_uniform_radiance_by_precomputed_irradiance() {
     }
 }
 
-#[test]
-fn a_furnace_has_uniform_radiance_where_every_gather_ray_goes_on() {
-    let settings = settings().with(|s| s.integrator.near_distance = Some(100.0));
-    for albedo in [0.2, 0.8] {
-        let expected = EMISSION as f64 / (1.0 - albedo as f64);
-        check_with(&furnace(lambertian("wall", albedo)), &settings, expected, 0.02);
-    }
-}
-
 /// A Phong lobe reflects less at grazing angles: in uniform radiance, a small wall with a lobe shows its
 /// directional albedo.
 #[test]

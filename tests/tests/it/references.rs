@@ -91,7 +91,17 @@ fn read(reference: &str) -> RgbImage {
 }
 
 /// Checks a scene with mirrors, glass, textures or a sky, for a number of photons and of samples.
-fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>, [photons, samples]: [u32; 2]) {
+fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>, numbers: [u32; 2]) {
+    check_light_paths_with(scene, reference, environment, numbers, None);
+}
+
+fn check_light_paths_with(
+    scene: &str,
+    reference: &str,
+    environment: Option<&str>,
+    [photons, samples]: [u32; 2],
+    near_distance: Option<f32>,
+) {
     let mut scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let file = environment.map(|file| path("../scenes").join(file));
     scene.environment = file.map(|file| Environment::load(&file).expect("a shipped sky loads"));
@@ -103,7 +113,13 @@ fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>, [p
             ..Picture::default()
         },
         photons: PhotonMaps { count: photons as usize, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 8, shadow_rays: 2, samples, ..Integrator::default() },
+        integrator: Integrator {
+            gather_rays: 8,
+            shadow_rays: 2,
+            samples,
+            near_distance,
+            ..Integrator::default()
+        },
         cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
@@ -133,4 +149,11 @@ fn a_room_full_of_textures_agrees_with_its_reference() {
 #[test]
 fn a_court_under_a_sky_agrees_with_its_reference() {
     check_light_paths("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"), [500_000, 40]);
+}
+
+#[test]
+fn scenes_agree_with_their_references_where_all_gather_rays_go_on() {
+    let numbers = [100_000, 32];
+    check_light_paths_with("cornell-spheres.glb", "cornell-spheres.exr", None, numbers, Some(1e3));
+    check_light_paths_with("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"), numbers, Some(1e3));
 }

@@ -47,7 +47,7 @@ const MIN_CELLS: f32 = 8.0;
 const NEAR: f32 = 4.0;
 /// Diagonal of the scene divided by the maximum length of the gather rays that go on. Where photons are
 /// sparse, most rays would go on without this limit.
-const LEAST_FAR_RAYS: f32 = 16.0;
+const DIAGONAL_OVER_NEAR: f32 = 16.0;
 
 /// Card image with its photon map, ready for gathers.
 pub struct MappedImage {
@@ -216,11 +216,11 @@ pub fn map_traced(
         image = precompute_irradiance(image, settings.neighbors, max_distance, &go_on)?;
         times.estimating = start.elapsed();
     }
-    // Without a caustic map, photons alone bring the caustics of lights that no ray can hit.
+    // No ray can hit the lights of these caustics.
     let near_distance = if caustics.is_none() && has_punctual_caustics {
         0.0
     } else {
-        (NEAR * distances.usual).min(image.diagonal() / LEAST_FAR_RAYS)
+        (NEAR * distances.usual).min(image.diagonal() / DIAGONAL_OVER_NEAR)
     };
     let gathers = GatherParameters { max_distance, near_distance, caustics };
     Ok(MappedImage { image, gathers, paths, guiding, times })
