@@ -1,7 +1,7 @@
 //! Final gather: rays over the hemisphere, with a photon gather at the end of each ray.
 //!
 //! Emission at the end of a ray is direct light, weighted against shadow rays ([`super::direct`]). A ray that
-//! ends near goes on ([`near`]).
+//! ends near goes on from its end (Jensen 2001, section 9.3).
 
 use core::ops::Range;
 
@@ -27,7 +27,7 @@ pub struct GatherRayEnd {
     /// Cell of the gather point's hemisphere that contains the ray's direction.
     pub cell: u8,
     /// Weighted light, in the card image's radiance units, by light group: emission of the surface or
-    /// environment that the ray hits, or light that a near end and those after it reflect ([`near`]).
+    /// environment that the ray hits, or light that a near end and those after it reflect.
     pub light: GroupedLight,
     /// True if `light` is that of near ends.
     pub is_near: bool,
