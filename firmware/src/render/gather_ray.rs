@@ -1,4 +1,4 @@
-//! What a gather ray finds, by way of specular surfaces and narrow lobes.
+//! End of a gather ray: emission and reflecting surface, by way of specular surfaces and narrow lobes.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -11,7 +11,7 @@ use crate::memory::MemoryPort;
 use crate::scene::light::environment_radiance;
 use crate::scene::{Detail, Hit, Ray, Reflector, Surface, read_surface_with};
 
-/// What a gather ray finds.
+/// Light and end of a gather ray.
 pub(super) struct Arrived {
     /// Weighted emission, and light of punctual lights that narrow lobes on the way reflect, in the card
     /// image's radiance units.
@@ -35,8 +35,8 @@ impl Arrived {
     }
 }
 
-/// What ray `index` of a gather point finds, by its sampled direction, its weight and its hit. The surface at
-/// its end is read into `met`, with the geometric normal as normal.
+/// Light and end of ray `index` of a gather point, from its sampled direction, its weight and its hit. The
+/// surface at its end is read into `met`, with the geometric normal as normal.
 #[inline(always)]
 pub(super) fn arrive<M: MemoryPort>(
     context: &mut Context<M>,
@@ -77,7 +77,7 @@ pub(super) fn arrive<M: MemoryPort>(
     Ok(Arrived { direct, reached })
 }
 
-/// What a gather ray finds that leaves the scene: light of the environment, and light collected on the path.
+/// Light of a gather ray that leaves the scene: that of the environment, and that collected on the path.
 #[inline(never)]
 fn escaped<M: MemoryPort>(
     context: &mut Context<M>,

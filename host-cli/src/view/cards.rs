@@ -186,7 +186,7 @@ mod tests {
         board.borrow(&b);
         assert_eq!((board.rendered("a"), board.rendered("b")), ((2, false), (3, false)));
         board.leave(&a);
-        // What the last pass still says of it does not bring it back.
+        // Late events of the last pass do not bring it back.
         board.lose("a", "the link has ended".into(), Duration::ZERO);
         assert_eq!(
             (board.rendered("a"), board.describe()["cards"][2]["state"].as_str()),

@@ -375,15 +375,20 @@ impl<'a> Pilot<'a> {
 
     fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
-        let GatherParameters { max_distance, .. } = self.mapped.gathers;
+        let max_distance = self.mapped.gathers.max_distance;
         let neighbors = settings.photons.caustic_neighbors;
         let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
-        // The pilot measures the errors of gathers and of single rays: all gather rays end at their surfaces.
-        let gathers = GatherParameters { caustics, ..GatherParameters::within(max_distance) };
-        let settings = settings.clone().with(|settings| settings.integrator.near_distance = None);
-        let frame = settings.frame(&camera, &gathers);
-        // The pilot reads the light of all groups alone, and its card image may have no identities.
-        Ok(FrameParameters { position: false, coverage: false, identities: false, light_groups: 0, ..frame })
+        let frame = settings.frame(&camera, &GatherParameters { caustics, ..self.mapped.gathers });
+        // The pilot reads the light of all groups alone, and its card image may have no identities. It
+        // measures the errors of gathers and of single rays: all gather rays end at their surfaces.
+        Ok(FrameParameters {
+            position: false,
+            coverage: false,
+            identities: false,
+            light_groups: 0,
+            near_distance: 0.0,
+            ..frame
+        })
     }
 
     fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {
