@@ -97,7 +97,7 @@ def frame_of(head, side):
         number(integrator["planned_samples"] or samples),
         *(number(integrator[name]) for name in ("gather_rays", "shadow_rays")),
         number(photons["neighbors"]) + floats(head["gathers"]["max_distance"]),
-        number(("Reflection", "Photon", "Product", "Mixture").index(integrator["sampling"])),
+        number(("Reflection", "Photon", "Product", "Mixture", "Focused").index(integrator["sampling"])),
         option(error and floats(error)),
         number(8) + number(2) + number(2**32 - 1),  # bins, drain along a Hilbert curve, queue
         number(("Density", "Precomputed").index(photons["radiance"])),

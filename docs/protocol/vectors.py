@@ -32,7 +32,7 @@ CAUSTICS = (("neighbors", "u32"), ("max_distance", "f32"))
 FRAME = (
     ("width", "u32"), ("height", "u32"), ("camera", CAMERA), ("seed", "u32"), ("first_sample", "u32"),
     ("samples", "u32"), ("planned_samples", "u32"), ("gather_rays", "u32"), ("shadow_rays", "u32"),
-    ("neighbors", "u32"), ("max_distance", "f32"), ("sampling", 4), ("irradiance_error", ["f32"]),
+    ("neighbors", "u32"), ("max_distance", "f32"), ("sampling", 5), ("irradiance_error", ["f32"]),
     ("bins", "u32"), ("drain", 4), ("queue", "u32"), ("radiance", 2), ("caustics", [CAUSTICS]),
     ("layers", "flag"), ("filter", 3), ("in_flight", "u32"), ("keep_records", "flag"),
     ("adaptive_threshold", ["f32"]), ("transparent", "flag"), ("position", "flag"), ("coverage", "flag"),

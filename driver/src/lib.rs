@@ -45,7 +45,8 @@
 //! scene, with the fewest samples and medium numbers of rays and photons.
 //! [`Quality::fit`](quality::Quality::fit) chooses these numbers for a given scene;
 //! [`render_chosen`](render::render_chosen) can call it once the scene is packed. `RenderSettings::default()`
-//! is [`Quality::Paper`](quality::Quality::Paper), the nominal frame of Steinhurst's dissertation (2007). All
+//! is [`Quality::Paper`](quality::Quality::Paper), the nominal frame of Steinhurst's dissertation (2007), but
+//! for near ends of gather rays and foci of their directions, which `Paper` does without. All
 //! these settings are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
 //! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders
 //! further pictures on cards that stay open. [`tone_mapping::write_png`] writes a tone-mapped PNG;

@@ -17,7 +17,7 @@ const TECHNIQUES = [
     ["gather_rays", "Gather rays", 0],
     ["tile", "Side of tiles (0: widest)", 0],
     ["order", "Order of gathers", listed(["naive", "tiled", "dirbin", "hash", "sort"])],
-    ["sampling", "Importance sampling", listed(["brdf", "photon", "combined", "mixture"])],
+    ["sampling", "Importance sampling", listed(["brdf", "photon", "combined", "mixture", "focused"])],
     ["cache", "Irradiance cache", [[true, "on"], [false, "off"]]],
 ];
 

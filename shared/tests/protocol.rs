@@ -245,7 +245,7 @@ fn the_protocol_document_states_this_version() {
 /// protocol version.
 #[test]
 fn structures_have_their_golden_bytes() {
-    assert_eq!(PROTOCOL_VERSION, 18);
+    assert_eq!(PROTOCOL_VERSION, 19);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,

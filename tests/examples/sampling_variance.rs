@@ -17,11 +17,12 @@ const COUNTS: [u32; 7] = [12, 25, 50, 100, 200, 400, 800];
 const SEEDS: u32 = 8;
 const SIDE: u32 = 14;
 const REFERENCE_RAYS: u32 = 10_000;
-const SAMPLINGS: [(&str, Sampling); 4] = [
+const SAMPLINGS: [(&str, Sampling); 5] = [
     ("brdf", Sampling::Reflection),
     ("photon", Sampling::Photon),
     ("product", Sampling::Product),
     ("mixture", Sampling::Mixture),
+    ("focused", Sampling::Focused),
 ];
 
 /// Mean and variance over seeds of the radiance at each point.

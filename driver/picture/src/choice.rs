@@ -57,6 +57,7 @@ choices!(Sampling {
     Photon = "photon": "The photons that arrive at the point",
     Product = "combined": "The product of both",
     Mixture = "mixture": "The mean of both",
+    Focused = "focused": "The product of both, and cones around photons that arrive from nearly the same direction",
 });
 
 choices!(Filter {

@@ -23,7 +23,7 @@ pub(super) fn rays_per_step(frame: &FrameParameters) -> u32 {
     if frame.near_distance > 0.0 { RAYS_PER_STEP_WITH_NEAR_ENDS } else { RAYS_PER_STEP }
 }
 
-/// Part of a gather point that is stored while the point's rays are cast, one direction bin after another; 48
+/// Part of a gather point that is stored while the point's rays are cast, one direction bin after another; 64
 /// bytes. The remainder is computed again in each bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
@@ -36,7 +36,7 @@ pub(super) struct StoredPoint {
     pub(super) rays: StoredRays,
 }
 
-const _: () = assert!(size_of::<StoredPoint>() == 48);
+const _: () = assert!(size_of::<StoredPoint>() == 64);
 
 /// Number of rays of a gather point in 15 bits, and the flag [`Self::OF_LOBE`], which is set if the rays
 /// sample only the lobe.

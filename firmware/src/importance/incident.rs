@@ -14,6 +14,7 @@ use photoncard_shared::layout::decode_direction;
 use photoncard_shared::message::Sampling;
 
 use super::cell_of;
+use super::focus::{Directions, FOCI, Focus};
 use super::hemisphere::CELLS;
 use super::table::DirectionTable;
 use crate::fixed_point::Sum;
@@ -24,8 +25,10 @@ use crate::vector::{max, unit};
 
 /// Fraction of the flux in a product table that is spread evenly over the cells (defensive sampling). Light
 /// varies within a cell, and may come through a cell without photons. The even part bounds the weight of a
-/// ray by about twice the albedo. `docs/techniques.md` has the measurement.
+/// ray by about twice the albedo, and with foci by five times. `docs/techniques.md` has the measurement.
 const EVEN_SHARE: f32 = 0.55;
+/// Maximum share of a focus, as a multiple of its cell's.
+const FOCUSED: f32 = 4.0;
 /// Minimum flux of a cell in a photon table, as a fraction of the mean flux (Jensen 1995).
 const EMPTY_CELL: f32 = 0.1;
 /// Number of directions sampled from the lobe to distribute it over the cells.
@@ -35,12 +38,15 @@ const LOBE_POINTS: u32 = 32;
 /// half.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
 /// Minimum share of the rays for the lobe's own entry, as a multiple of
-/// `lobe albedo / (diffuse albedo + lobe albedo)`.
+/// `lobe albedo / (diffuse albedo + lobe albedo)`, of the rays that foci leave.
 const LOBE_PART: f32 = 0.25;
 
 /// Flux through the cells of the hemisphere: photon power weighted by a colour, in photon power units.
+#[derive(Default)]
 pub struct IncidentFlux {
     cells: [Sum; CELLS],
+    /// Directions of the photons of each cell, for foci.
+    directions: [Directions; CELLS],
     /// Sum of the squared photon powers.
     squares: Sum,
 }
@@ -50,8 +56,14 @@ impl IncidentFlux {
     /// at most about 1, weights the channels of their power. `normal` is the shading normal, the axis of the
     /// hemisphere; `normal_code` is the code of the geometric normal, by which photons of the surface are
     /// recognised.
-    pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
-        let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
+    pub fn new(
+        nearest: &NearestPhotons,
+        sampling: Sampling,
+        normal: Vec3,
+        normal_code: u8,
+        colour: Vec3,
+    ) -> Self {
+        let mut flux = Self::default();
         let mut same_surface = SameSurface::new(normal_code);
         for photon in nearest.candidates() {
             if photon.is_direct() || !same_surface.holds(photon.normal()) {
@@ -64,6 +76,11 @@ impl IncidentFlux {
             if let Some(sum) = flux.cells.get_mut(cell as usize) {
                 sum.add(power);
                 flux.squares.add(power * power);
+            }
+            if sampling == Sampling::Focused
+                && let Some(directions) = flux.directions.get_mut(cell as usize)
+            {
+                directions.add(direction, power);
             }
         }
         flux
@@ -85,6 +102,22 @@ impl IncidentFlux {
         cells.map(|cell| mean + known * (cell - mean))
     }
 
+    /// Foci of the cells with the greatest shares of foci, and these shares in the units of `shares`. A cell
+    /// that is not much brighter than others has a small one.
+    fn foci(&self, shares: &Shares) -> [(Focus, f32); FOCI] {
+        let mut foci = [(Focus::NONE, 0.0_f32); FOCI];
+        let cells = self.cells.iter().zip(&self.directions).zip(shares.cells.iter().zip(&shares.uneven));
+        for ((power, directions), (share, uneven)) in cells {
+            let Some((focus, known)) = directions.focus(power.value()) else { continue };
+            let share = FOCUSED * known * uneven * uneven * uneven * share;
+            let least = foci.iter_mut().min_by(|(_, a), (_, b)| a.total_cmp(b));
+            if let Some(least) = least.filter(|(_, least)| share > *least) {
+                *least = (focus, share);
+            }
+        }
+        foci
+    }
+
     /// Direction table of the sampling method `sampling`. The reflection must not be black.
     pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
         match sampling {
@@ -94,7 +127,11 @@ impl IncidentFlux {
                 let least = EMPTY_CELL * mean(&cells);
                 DirectionTable::new(&cells.map(|cell| max(cell, least)), 0.0)
             }
-            Sampling::Product => product(&self.shrunk(), reflector),
+            // Photons have left no directions for foci by the product alone.
+            Sampling::Product | Sampling::Focused => {
+                let shares = product(&self.shrunk(), reflector);
+                DirectionTable::with_foci(&shares.cells, shares.lobe, &self.foci(&shares))
+            }
             Sampling::Mixture => mixture(&self.shrunk(), reflector),
         }
     }
@@ -112,15 +149,25 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// Product table, in proportion to flux times reflection. The light that the lobe reflects is divided between
-/// the cells and the lobe's own entry. For a lobe narrower than two cells, most of it goes to that entry.
-fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
+/// Shares of a product table.
+struct Shares {
+    cells: [f32; CELLS],
+    /// Fraction of each cell's share that is not spread evenly over the cells.
+    uneven: [f32; CELLS],
+    lobe: f32,
+}
+
+/// Shares of a product table, in proportion to flux times reflection. The light that the lobe reflects is
+/// divided between the cells and the lobe's own entry. For a lobe narrower than two cells, most of it goes to
+/// that entry.
+fn product(flux: &[f32; CELLS], reflector: &Reflector) -> Shares {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);
     let flux = flux.map(|flux| even + (1.0 - EVEN_SHARE) * flux);
+    let uneven = flux.map(|flux| 1.0 - even / flux);
     let mut cells = flux.map(|flux| flux * diffuse);
     if specular <= 0.0 {
-        return DirectionTable::new(&cells, 0.0);
+        return Shares { cells, uneven, lobe: 0.0 };
     }
     let held = HALF_HELD_SHARPNESS / (HALF_HELD_SHARPNESS + reflector.lobe_sharpness());
     let mut lobe = 0.0;
@@ -137,7 +184,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     }
     let all: f32 = cells.iter().sum::<f32>() + lobe;
     let least = LOBE_PART * specular / (diffuse + specular) * all;
-    DirectionTable::new(&cells, max(lobe, least))
+    Shares { cells, uneven, lobe: max(lobe, least) }
 }
 
 /// Directions sampled from the lobe, each with its cell. Directions below the shading horizon are omitted.
@@ -164,7 +211,7 @@ mod tests {
 
     fn flux_of(cells: [f32; CELLS], photons: u32) -> IncidentFlux {
         let all: f32 = cells.iter().sum();
-        let mut flux = IncidentFlux { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
+        let mut flux = IncidentFlux::default();
         flux.cells.iter_mut().zip(cells).for_each(|(sum, cell)| sum.add(cell));
         flux.squares.add(all * all / photons as f32);
         flux
@@ -202,7 +249,8 @@ mod tests {
         dark[..8].fill(0.01);
         for exponent in [50.0, 1000.0] {
             let share = |flux: &[f32; CELLS]| {
-                let table = product(flux, &reflector(exponent));
+                let Shares { cells, lobe, .. } = product(flux, &reflector(exponent));
+                let table = DirectionTable::new(&cells, lobe);
                 let density = table.density(&reflector(exponent), Vec3::Y);
                 density / DirectionTable::COSINE.density(&reflector(exponent), Vec3::Y)
             };

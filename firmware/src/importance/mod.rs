@@ -2,10 +2,10 @@
 //! both.
 //!
 //! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and
-//! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is mapped by
-//! the table's inverse cumulative distribution function. The density of the whole mixture weights each ray,
-//! so that no choice of shares biases the picture. The sampling methods differ only in the source of the
-//! shares:
+//! one more entry for the reflection's lobe and for foci, cones about the photons of a cell. Each has a share
+//! of the rays. A stratified pattern is mapped by the table's inverse cumulative distribution function. The
+//! density of the whole mixture weights each ray, so that no choice of shares biases the picture. The
+//! sampling methods differ only in the source of the shares:
 //!
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
@@ -13,6 +13,7 @@
 //! | photon | the flux of the photons that came through it | none |
 //! | product | the same flux, times the reflection | the part of the lobe narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
+//! | focused | as of product, and foci where the photons of a cell arrive close together | as of product |
 //!
 //! *Photon* is from Jensen 1995, *Importance driven path tracing using the photon map*; *product* from
 //! Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*.
@@ -22,6 +23,7 @@
 //!
 //! Generative reordering derives its direction bins from the table entries ([`DirectionTable::bin`]).
 
+mod focus;
 mod hemisphere;
 mod incident;
 mod table;

@@ -4,24 +4,35 @@ use core::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
+use super::focus::{FOCI, Focus};
 use super::hemisphere::{CELLS, direction_in};
 use super::{GatherDirection, cell_of};
 use crate::sampler::Pattern;
 use crate::scene::Reflector;
 use crate::vector::max;
 
-/// Number of entries of a table: the cells of the hemisphere in their order, then the lobe.
+/// Number of entries of a table: the cells of the hemisphere in their order, then the lobe with the foci.
 pub const ENTRIES: usize = CELLS + 1;
 
-/// Index of the lobe's entry.
-const LOBE: usize = CELLS;
+/// Index of the entry of the lobe and the foci.
+const AIMED: usize = CELLS;
 
-/// Shares of a gather point's rays: one for each cell of the hemisphere, and one for the rays sampled from
-/// the lobe; 34 bytes. The shares are integers, so that densities are exact.
+/// Shares of a gather point's rays: one for each cell of the hemisphere, one for the rays sampled from the
+/// lobe, and one for each focus; 50 bytes. The shares are integers, so that densities are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DirectionTable {
     cells: [u8; CELLS],
     lobe: u16,
+    foci: [Focus; FOCI],
+}
+
+const _: () = assert!(size_of::<DirectionTable>() == 50);
+
+/// What a ray is sampled from.
+enum Source {
+    Cell(u8),
+    Lobe,
+    Focus(Focus),
 }
 
 impl Default for DirectionTable {
@@ -32,28 +43,46 @@ impl Default for DirectionTable {
 
 impl DirectionTable {
     /// Table with equal cells: the density `cos(theta) / pi`.
-    pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
+    pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0, foci: [Focus::NONE; FOCI] };
 
-    /// Creates a table whose shares are in proportion to `cells` and `lobe`. These must be finite and not
-    /// negative. If any cell is positive, every cell gets a share.
+    /// Creates a table without foci, whose shares are in proportion to `cells` and `lobe`. These must be
+    /// finite and not negative. If any cell is positive, every cell gets a share.
     pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
-        let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
+        Self::with_foci(cells, lobe, &[(Focus::NONE, 0.0); FOCI])
+    }
+
+    /// Creates a table as [`Self::new`], with foci and their shares.
+    #[inline(never)]
+    pub(super) fn with_foci(cells: &[f32; CELLS], lobe: f32, foci: &[(Focus, f32); FOCI]) -> Self {
+        let shares = cells.iter().chain(foci.iter().map(|(_, share)| share));
+        let greatest = shares.fold(0.0, |greatest, &share| max(share, greatest));
         if greatest <= 0.0 {
-            return if lobe > 0.0 { Self { cells: [0; CELLS], lobe: 1 } } else { Self::COSINE };
+            return if lobe > 0.0 {
+                Self { cells: [0; CELLS], lobe: 1, ..Self::COSINE }
+            } else {
+                Self::COSINE
+            };
         }
         let scale = u8::MAX as f32 / greatest;
         let cells = cells.map(|cell| ((cell * scale + 0.5) as u8).max(1));
         // The conversion saturates.
         let lobe = if lobe > 0.0 { ((lobe * scale + 0.5) as u16).max(1) } else { 0 };
-        Self { cells, lobe }
+        let foci = foci.map(|(focus, share)| focus.with_share((share * scale + 0.5) as u8));
+        Self { cells, lobe, foci }
+    }
+
+    /// Share of the lobe and the foci.
+    #[inline(always)]
+    fn aimed(&self) -> u32 {
+        self.lobe as u32 + self.foci.iter().map(|focus| focus.share as u32).sum::<u32>()
     }
 
     #[inline(always)]
     fn total(&self) -> u32 {
-        sum(&self.cells) + self.lobe as u32
+        sum(&self.cells) + self.aimed()
     }
 
-    /// Fraction of all rays that belong to a cell's entry. Rays of the lobe's entry that pass through the
+    /// Fraction of all rays that belong to a cell's entry. Rays of the lobe and of foci that pass through the
     /// cell are not included.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
@@ -61,14 +90,14 @@ impl DirectionTable {
 
     #[inline(always)]
     fn share(&self, entry: usize) -> u32 {
-        self.cells.get(entry).map_or(self.lobe as u32, |&share| share as u32)
+        self.cells.get(entry).map_or_else(|| self.aimed(), |&share| share as u32)
     }
 
     /// Sum of the shares of all entries before `entry`.
     #[inline(always)]
     fn before(&self, entry: usize) -> u32 {
         let cells = self.cells.get(..entry.min(CELLS)).unwrap_or_default();
-        sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
+        sum(cells) + if entry > AIMED { self.aimed() } else { 0 }
     }
 
     /// Index of the first ray, out of `count` rays, in direction bin `bin` or a later bin; `count` if there
@@ -139,23 +168,36 @@ impl DirectionTable {
             }
             before += share as u32;
         }
-        (LOBE, before)
+        (AIMED, before)
     }
 
-    /// Entry of ray `index` of `count`, and the ray's two coordinates in [0, 1] within the entry, in the
-    /// order of [`direction_in`].
+    /// Source of ray `index` of `count`, and the ray's two coordinates in [0, 1] within it, in the order of
+    /// [`direction_in`].
     #[inline(always)]
-    fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
-        let Place { entry, offset, size } = self.place(pattern, index, count);
-        (entry, [part(offset, size), pattern.radical_inverse(index)])
+    fn source(&self, pattern: Pattern, index: u32, count: u32) -> (Source, [f32; 2]) {
+        let Place { entry, mut offset, mut size } = self.place(pattern, index, count);
+        let mut source = Source::Cell(entry as u8);
+        if entry == AIMED {
+            source = Source::Lobe;
+            size = self.lobe as u64 * whole(count);
+            let mut foci = self.foci.iter();
+            while offset >= size
+                && let Some(&focus) = foci.next()
+            {
+                offset -= size;
+                size = focus.share as u64 * whole(count);
+                source = Source::Focus(focus);
+            }
+        }
+        (source, [part(offset, size), pattern.radical_inverse(index)])
     }
 
-    /// Number of rays, out of `count`, that each cell's entry gets. Rays of the lobe's entry are not
+    /// Number of rays, out of `count`, that each cell's entry gets. Rays of the lobe and of foci are not
     /// included.
     pub fn rays_in_cells(&self, pattern: Pattern, count: u32) -> [u16; CELLS] {
         let mut rays = [0; CELLS];
         for index in 0..count {
-            let (entry, _) = self.entry(pattern, index, count);
+            let Place { entry, .. } = self.place(pattern, index, count);
             if let Some(rays) = rays.get_mut(entry) {
                 *rays += 1;
             }
@@ -172,22 +214,22 @@ impl DirectionTable {
         index: u32,
         count: u32,
     ) -> Option<GatherDirection> {
-        let (entry, point) = self.entry(pattern, index, count);
+        let (source, point) = self.source(pattern, index, count);
         let Reflector { normal, .. } = reflector;
-        let direction = if entry == LOBE {
-            let [along, across] = point;
-            reflector.sample_lobe([across, along])
-        } else {
-            direction_in(*normal, entry as u8, point)
+        let [along, across] = point;
+        let direction = match source {
+            Source::Cell(cell) => direction_in(*normal, cell, point),
+            Source::Lobe => reflector.sample_lobe([across, along]),
+            Source::Focus(focus) => focus.sample(point),
         };
         let cosine = normal.dot(direction);
         // The cell is that of the entry, because the rounded direction may lie in another cell.
-        let cell = if entry == LOBE { cell_of(*normal, direction)? } else { entry as u8 };
+        let cell = if let Source::Cell(cell) = source { cell } else { cell_of(*normal, direction)? };
         if cosine <= 0.0 {
             return None;
         }
         let (value, lobe_density) = reflector.sampled(direction);
-        let density = self.mixture_density(cell, cosine, lobe_density);
+        let density = self.mixture_density(cell, cosine, lobe_density) + self.focused_density(direction);
         let weight = value * (cosine / density);
         (density > 0.0).then_some(GatherDirection { direction, weight, density, cell })
     }
@@ -196,7 +238,9 @@ impl DirectionTable {
     #[inline(always)]
     pub fn density(&self, reflector: &Reflector, direction: Vec3) -> f32 {
         let Some(cell) = cell_of(reflector.normal, direction) else { return 0.0 };
-        self.mixture_density(cell, reflector.normal.dot(direction), reflector.lobe_density(direction))
+        let cosine = reflector.normal.dot(direction);
+        self.mixture_density(cell, cosine, reflector.lobe_density(direction))
+            + self.focused_density(direction)
     }
 
     #[inline(always)]
@@ -205,6 +249,19 @@ impl DirectionTable {
         let cell_share = self.share(cell as usize) as f32 * per_share;
         let lobe_share = self.lobe as f32 * per_share;
         cell_share * CELLS as f32 * FRAC_1_PI * cosine + lobe_share * lobe_density
+    }
+
+    /// Part of the density that is that of the foci, 1/sr.
+    #[inline(always)]
+    fn focused_density(&self, direction: Vec3) -> f32 {
+        if self.aimed() == self.lobe as u32 { 0.0 } else { self.density_of_foci(direction) }
+    }
+
+    #[inline(never)]
+    fn density_of_foci(&self, direction: Vec3) -> f32 {
+        let of = |focus: &Focus| focus.share as f32 * focus.density(direction);
+        let density: f32 = self.foci.iter().filter(|focus| focus.share > 0).map(of).sum();
+        density / self.total() as f32
     }
 }
 
@@ -290,6 +347,7 @@ mod tests {
 
     use photoncard_shared::budget::MAX_GATHER_RAYS;
 
+    use super::super::focus::Directions;
     use super::*;
     use crate::sampler::Dimension;
     use crate::scene::Reflection;
@@ -312,10 +370,27 @@ mod tests {
         DirectionTable::new(&cells, lobe)
     }
 
+    /// A table with pseudo-random shares of the cells and of foci about directions above `Y` and close to its
+    /// horizon, one of them without a share.
+    fn focused(seed: u32, lobe: f32) -> DirectionTable {
+        let mut foci = [(Focus::NONE, 0.0); FOCI];
+        for (index, (focus, share)) in foci.iter_mut().enumerate() {
+            let [x, z] = [index as f32 - 1.5, 1.0 - index as f32];
+            let mut directions = Directions::default();
+            let near = (0..20).map(|i| Vec3::new(x, 0.2 + index as f32, z + 0.02 * i as f32).normalize());
+            near.for_each(|direction| directions.add(direction, 1.0));
+            *focus = directions.focus(20.0).expect("a focus").0;
+            *share = if index == 1 { 0.0 } else { 700.0 * index as f32 + 300.0 };
+        }
+        let cells = uneven(seed, 0.0).cells.map(f32::from);
+        DirectionTable::with_foci(&cells.map(|cell| 3.0 * cell), lobe, &foci)
+    }
+
     #[test]
     fn bins_follow_the_rays_and_hold_only_rays_of_their_entries() {
         for seed in 0..20 {
-            let table = uneven(seed, 2000.0 * (seed % 3) as f32);
+            let lobe = 2000.0 * (seed % 3) as f32;
+            let table = if seed % 2 == 0 { uneven(seed, lobe) } else { focused(seed, lobe) };
             for (count, bins) in [(100, 33), (7, 33), (200, 66), (1, 256), (256, 11), (5000, 100)] {
                 let mut last = 0;
                 for ray in 0..count {
@@ -325,8 +400,8 @@ mod tests {
                     }
                     assert!(last <= bin && bin < bins);
                     last = bin;
-                    let (entry, [along, _]) = table.entry(pattern(seed), ray, count);
-                    let place = (entry as f32 + along) * bins as f32 / ENTRIES as f32;
+                    let Place { entry, offset, size } = table.place(pattern(seed), ray, count);
+                    let place = (entry as f32 + part(offset, size)) * bins as f32 / ENTRIES as f32;
                     assert!(place > bin as f32 - 1e-3 && place < bin as f32 + 1.001, "{place} {bin}");
                 }
                 assert_eq!(table.first_ray(pattern(seed), count, 0, bins), 0);
@@ -379,14 +454,18 @@ mod tests {
         let lambertian = reflector(0.7, 0.0, 0.0, Vec3::new(1.0, 1.0, 0.0));
         assert!((mean_weight(&DirectionTable::COSINE, &lambertian) - 0.7).abs() < 1e-5);
         for seed in 0..5 {
-            let mean = mean_weight(&uneven(seed, 0.0), &lambertian);
-            assert!((mean - 0.7).abs() < 2e-3, "{mean}");
+            for table in [uneven(seed, 0.0), focused(seed, 0.0)] {
+                let mean = mean_weight(&table, &lambertian);
+                assert!((mean - 0.7).abs() < 4e-3, "{mean}");
+            }
         }
         // The integral of (n + 2) / (2 pi) cos^n cos is 1 where the lobe's axis is the normal.
         for exponent in [1.0, 8.0, 128.0, 1000.0] {
             for lobe in [3000.0, 30_000.0] {
-                let mean = mean_weight(&uneven(3, lobe), &reflector(0.4, 0.35, exponent, Vec3::Y));
-                assert!((mean - 0.75).abs() < 5e-3, "{exponent}: {mean}");
+                for table in [uneven(3, lobe), focused(3, lobe)] {
+                    let mean = mean_weight(&table, &reflector(0.4, 0.35, exponent, Vec3::Y));
+                    assert!((mean - 0.75).abs() < 5e-3, "{exponent}: {mean}");
+                }
             }
         }
         let without_lobe = mean_weight(&uneven(4, 0.0), &reflector(0.4, 0.35, 8.0, Vec3::Y));
@@ -402,8 +481,8 @@ mod tests {
     fn the_density_of_a_sampled_direction_is_the_one_it_was_sampled_with() {
         let flat = reflector(0.3, 0.5, 20.0, Vec3::new(2.0, 1.0, 0.5));
         let tilted = on_another_triangle(reflector(0.3, 0.5, 20.0, Vec3::new(-2.0, 1.0, 0.5)));
-        for reflector in [flat, tilted] {
-            let table = uneven(9, 4000.0);
+        let tables = [uneven(9, 4000.0), focused(9, 4000.0)];
+        for (reflector, table) in [flat, tilted].into_iter().flat_map(|r| tables.map(|table| (r, table))) {
             let mut others = 0;
             for index in 0..1000 {
                 let Some(sampled) = table.sample(&reflector, pattern(1), index, 1000) else { continue };
@@ -419,8 +498,8 @@ mod tests {
     fn the_density_above_the_triangle_integrates_to_the_fraction_of_directions_there() {
         let flat = reflector(0.3, 0.5, 20.0, Vec3::new(0.2, 1.0, 0.1));
         let tilted = on_another_triangle(reflector(0.3, 0.5, 20.0, Vec3::new(-1.0, 1.0, 0.1)));
-        let table = uneven(2, 4000.0);
-        for reflector in [flat, tilted] {
+        let tables = [uneven(2, 4000.0), focused(2, 4000.0)];
+        for (reflector, table) in [flat, tilted].into_iter().flat_map(|r| tables.map(|table| (r, table))) {
             let is_above = |direction: Vec3| reflector.geometric_normal.dot(direction) > 0.0;
             let side = 1000;
             let mut integral = 0.0_f64;
@@ -448,6 +527,6 @@ mod tests {
         cells[3] = 1e6;
         assert!(DirectionTable::new(&cells, 0.0).cells.iter().all(|&share| share >= 1));
         assert_eq!(DirectionTable::new(&[0.0; CELLS], 0.0), DirectionTable::COSINE);
-        assert_eq!(DirectionTable::new(&[0.0; CELLS], 1.0).share(LOBE), 1);
+        assert_eq!(DirectionTable::new(&[0.0; CELLS], 1.0).share(AIMED), 1);
     }
 }

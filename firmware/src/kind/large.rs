@@ -28,7 +28,7 @@ impl ChipKind for Large {
     type Buckets = Entries<{ gather_buckets(LARGE.gather_queue) }>;
     type WaitingBlocks = Entries<{ LARGE.waiting_blocks as usize }>;
     type IrradianceRecords = Entries<{ LARGE.irradiance_records as usize }>;
-    type Points = Entries<{ LARGE.tile_pixels as usize }>;
+    type Points = Entries<3328>;
     type Flights = Entries<{ LARGE.in_flight as usize }>;
 
     fn budget(&self) -> &Budget {
@@ -42,6 +42,6 @@ impl FixedKind for Large {
     const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
         reordering: 772 << 10,
         irradiance_cache: 640 << 10,
-        importance_sampling: 136 << 10,
+        importance_sampling: 163 << 10,
     };
 }

@@ -48,5 +48,5 @@ impl<const DRAM_MB: u32> FixedKind for Micro<DRAM_MB> {
     const KIND: Self = Self;
     const BUDGET: Budget = Budget { dram_bytes: (DRAM_MB as u64) << 20, ..MICRO };
     const TECHNIQUE_LIMITS: TechniqueMemory =
-        TechniqueMemory { reordering: 30 << 10, irradiance_cache: 48 << 10, importance_sampling: 8704 };
+        TechniqueMemory { reordering: 30 << 10, irradiance_cache: 48 << 10, importance_sampling: 12_800 };
 }

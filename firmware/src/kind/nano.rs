@@ -47,5 +47,5 @@ impl FixedKind for Nano {
     const KIND: Self = Self;
     const BUDGET: Budget = NANO;
     const TECHNIQUE_LIMITS: TechniqueMemory =
-        TechniqueMemory { reordering: 8 << 10, irradiance_cache: 11 << 10, importance_sampling: 2304 };
+        TechniqueMemory { reordering: 8 << 10, irradiance_cache: 11 << 10, importance_sampling: 3328 };
 }

@@ -40,7 +40,7 @@ impl ChipKind for Reference {
     type Buckets = Entries<{ gather_buckets(REFERENCE.gather_queue) }>;
     type WaitingBlocks = Entries<{ REFERENCE.waiting_blocks as usize }>;
     type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
-    type Points = Entries<2048>;
+    type Points = Entries<1664>;
     type Flights = Entries<{ REFERENCE.in_flight as usize }>;
 
     fn budget(&self) -> &Budget {

@@ -148,7 +148,8 @@ impl GatherPoint {
                 nearest.len() as u32,
             );
             let code = encode_normal(geometric_normal.to_array());
-            IncidentFlux::new(&nearest, normal, code, reflector.albedo()).table(sampling, &reflector)
+            IncidentFlux::new(&nearest, sampling, normal, code, reflector.albedo())
+                .table(sampling, &reflector)
         };
         Ok(())
     }

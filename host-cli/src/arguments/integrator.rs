@@ -1,7 +1,6 @@
 //! Options of the integrator: samples, rays and the irradiance cache.
 
 use clap::{ArgAction, Args};
-use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{Integrator, MIN_IRRADIANCE_ERROR, Sampling};
 
@@ -32,9 +31,10 @@ pub(crate) struct IntegratorOptions {
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, hide_short_help = true)]
     pub(super) planned_spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value.
-    /// Points with fewer than eight gather rays always have the density brdf
-    #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
-    pub(super) sampling: Sampling,
+    /// Points with fewer than eight gather rays always have the density brdf [default: focused, combined for
+    /// paper and sweeps]
+    #[arg(long, value_parser = choice::<Sampling>(), hide_short_help = true)]
+    pub(super) sampling: Option<Sampling>,
     /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them
     /// [default: by --quality]
     #[arg(long, value_parser = switch(), action = ArgAction::Set)]
@@ -80,7 +80,7 @@ impl IntegratorOptions {
             planned_samples: self.planned_spp,
             gather_rays,
             shadow_rays: self.shadow_rays.unwrap_or(base.shadow_rays),
-            sampling: self.sampling,
+            sampling: self.sampling.unwrap_or(base.sampling),
             irradiance_error: (self.is_cached(base) && gather_rays > 0).then_some(error),
             adaptive_threshold: match self.adaptive {
                 None => base.adaptive_threshold,

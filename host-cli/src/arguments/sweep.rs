@@ -5,7 +5,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::Emulated;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::quality::Quality;
-use photoncard_driver::render::{ChipModel, RenderSettings};
+use photoncard_driver::render::{ChipModel, RenderSettings, Sampling};
 use photoncard_driver::study::{ALONG_CURVE, Axis, Hardware, MAX_POINTS, Point, Scale, Task};
 
 use super::cards::ChipOption;
@@ -100,7 +100,9 @@ impl SweepArguments {
     pub(crate) fn point(&self, name: &str, model: &ChipModel) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, caches, card: _, machine: _ } =
             &self.settings;
-        let base = quality.settings().with(|s| s.integrator.near_distance = Some(0.0));
+        let base = quality.settings().with(|s| {
+            (s.integrator.near_distance, s.integrator.sampling) = (Some(0.0), Sampling::Product);
+        });
         let settings = RenderSettings {
             picture: picture.settings(&base.picture),
             photons: photons.settings(&base.photons),

@@ -215,7 +215,7 @@ fn statistics_name_the_options_that_the_work_depends_on() {
         (
             &["--counters"],
             "cache",
-            json!("photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=809K/128/4"),
+            json!("photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=835072/128/4"),
         ),
         (&["--cache", "unified=8K/128/2"], "cache", json!("unified=8K/128/2")),
         (&["--quality", "draft"], "quality", json!("draft")),

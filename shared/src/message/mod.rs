@@ -41,7 +41,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol that this module, [`crate::transport`] and [`crate::frame`] define.
-pub const PROTOCOL_VERSION: u16 = 18;
+pub const PROTOCOL_VERSION: u16 = 19;
 
 /// Maximum number of lines in one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -334,6 +334,9 @@ pub enum Sampling {
     /// Directions are chosen in proportion to the mean of the densities of [`Self::Reflection`] and
     /// [`Self::Photon`].
     Mixture,
+    /// Directions are chosen as by [`Self::Product`] and, where photons arrive from nearly the same
+    /// direction, in narrow cones around it.
+    Focused,
 }
 
 /// Source of the reflected radiance at the end of a gather ray.

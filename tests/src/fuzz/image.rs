@@ -77,7 +77,7 @@ pub fn frame(choice: u8) -> FrameParameters {
         gather_rays: 8,
         shadow_rays: 2,
         samples: 1 + u32::from(is_set(0)),
-        sampling: [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture]
+        sampling: [Sampling::Reflection, Sampling::Photon, Sampling::Mixture, Sampling::Focused]
             [usize::from(choice >> 1 & 3)],
         irradiance_error: is_set(3).then_some(0.2),
         bins: if is_set(4) { 8 } else { 1 },

@@ -116,12 +116,14 @@ fn photons(place: &Place) -> Option<Step> {
 fn directions(place: &Place) -> Option<Step> {
     Some(if place.is_in("irradiance_cache/survey.rs") {
         Step::SurveyRay
-    } else if place.is_in("irradiance_cache/gradient.rs") || place.is_of("irradiance_cache/mod.rs", "add") {
+    } else if place.is_in("irradiance_cache/gradient/") || place.is_of("irradiance_cache/mod.rs", "add") {
         Step::RecordRay
     } else if place.is_in("irradiance_cache/") {
         Step::Interpolated
     } else if place.is_in("importance/table.rs")
-        && ["new", "of_reflection"].map(|name| place.is_of("importance/table.rs", name)).contains(&true)
+        && ["new", "with_foci", "of_reflection"]
+            .map(|name| place.is_of("importance/table.rs", name))
+            .contains(&true)
     {
         Step::Table
     } else if place.is_in("importance/") || place.is_in("render/final_gather.rs") {

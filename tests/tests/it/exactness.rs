@@ -296,6 +296,11 @@ fn mixture_sampling_is_exact() {
 }
 
 #[test]
+fn focused_sampling_is_exact() {
+    check_variants(Sampling::Focused);
+}
+
+#[test]
 fn precomputed_irradiance_is_exact() {
     check_variants_of(&glossy(), &few_pixels().with(|s| s.photons.radiance = Radiance::Precomputed));
 }

@@ -99,6 +99,7 @@ fn a_furnace_is_uniform_with_records_of_any_sampling() {
         (0.5, Sampling::Photon),
         (0.8, Sampling::Product),
         (0.5, Sampling::Mixture),
+        (0.8, Sampling::Focused),
     ] {
         let settings = RenderSettings {
             picture: Picture { width: 64, height: 64, ..Picture::default() },

@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::{Finish, Fit, Quality, Stated};
-use photoncard_driver::render::{RenderSettings, Unobserved};
+use photoncard_driver::render::{RenderSettings, Sampling, Unobserved};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scene::{
     Environment, LightAxes, Material, PunctualKind, PunctualLight, Reflection, Scene, Triangle,
@@ -146,8 +146,10 @@ fn the_dissertations_values_depend_on_no_scene() {
     );
     let fit = fit.expect("no pilot");
     assert_eq!(fit, None);
-    // The dissertation gathers photons at the end of every gather ray.
-    let dissertation = RenderSettings::default().with(|s| s.integrator.near_distance = Some(0.0));
+    // The dissertation gathers photons at the end of every gather ray, and its sampling has no foci.
+    let dissertation = RenderSettings::default().with(|s| {
+        (s.integrator.near_distance, s.integrator.sampling) = (Some(0.0), Sampling::Product);
+    });
     assert_eq!(Quality::Paper.settings(), dissertation);
 }
 

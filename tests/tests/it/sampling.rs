@@ -10,7 +10,9 @@ fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
     with_light_of(scene, camera, assignments, |light| {
         let reference = light.radiance(Sampling::Reflection, 10_000, 1);
         let reference: Vec<DVec3> = reference.into_iter().map(Vec3::as_dvec3).collect();
-        for sampling in [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture] {
+        for sampling in
+            [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture, Sampling::Focused]
+        {
             check_sampling(light, sampling, &reference);
         }
     });
@@ -84,7 +86,7 @@ fn indirect_light_of_the_atrium_is_equal_by_every_sampling() {
 #[test]
 fn fewer_than_eight_rays_follow_the_reflection_by_every_sampling() {
     with_light_of("cornell-glossy.gltf", Some("floor"), &[], |light| {
-        for sampling in [Sampling::Photon, Sampling::Product, Sampling::Mixture] {
+        for sampling in [Sampling::Photon, Sampling::Product, Sampling::Mixture, Sampling::Focused] {
             let is_of_reflection =
                 |rays| light.radiance(sampling, rays, 1) == light.radiance(Sampling::Reflection, rays, 1);
             assert_eq!([1, 7, 8].map(is_of_reflection), [true, true, false], "{sampling:?}");

@@ -327,11 +327,11 @@ mod tests {
         for (kind, caches) in [
             (
                 EmulatedKind::Reference,
-                "photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=809K/128/4",
+                "photon=128K/128/4,scene=75K/128/4,casting=504K/128/4,gathering=835072/128/4",
             ),
             (
                 EmulatedKind::Large,
-                "photon=128K/128/4,scene=128K/128/4,casting=879K/128/4,gathering=1720832/128/4",
+                "photon=128K/128/4,scene=128K/128/4,casting=879K/128/4,gathering=1734144/128/4",
             ),
         ] {
             assert_eq!(kind.caches().to_string(), caches);

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use photoncard_picture::choice::choices;
 
-use crate::{Filter, Integrator, PhotonMaps, Picture, RenderSettings};
+use crate::{Filter, Integrator, PhotonMaps, Picture, RenderSettings, Sampling};
 
 /// Quality of a picture. It determines the settings that the user does not state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -127,7 +127,9 @@ impl Quality {
     /// Settings like [`Self::settings`], but for a picture with the finish `finish`.
     pub fn settings_for(self, finish: Finish) -> RenderSettings {
         let Some(level) = self.level(finish) else {
-            return RenderSettings::default().with(|s| s.integrator.near_distance = Some(0.0));
+            return RenderSettings::default().with(|s| {
+                (s.integrator.near_distance, s.integrator.sampling) = (Some(0.0), Sampling::Product);
+            });
         };
         let samples = *level.samples.start();
         let rays = middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize) as u32;

@@ -327,7 +327,7 @@ impl Default for Integrator {
             planned_samples: None,
             gather_rays: 100,
             shadow_rays: 8,
-            sampling: Sampling::Product,
+            sampling: Sampling::Focused,
             irradiance_error: None,
             adaptive_threshold: None,
             near_distance: None,

@@ -90,7 +90,7 @@ pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
             76..82 => {
                 let (name, values) = match (numbers.next() * 4.0) as u32 {
                     0 => ("order", ["naive", "sort", "hash"]),
-                    1 => ("sampling", ["brdf", "photon", "combined"]),
+                    1 => ("sampling", ["brdf", "combined", "focused"]),
                     2 => ("spp", ["1", "2", "3"]),
                     _ => ("photons", ["500", "1000", "2000"]),
                 };
