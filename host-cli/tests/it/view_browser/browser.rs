@@ -125,6 +125,18 @@ pub(crate) trait Scripted {
     }
 }
 
+/// Tab with a mouse and a keyboard.
+pub(crate) trait Acting: Scripted {
+    /// Drags by `shift` pixels with a button of the mouse, from a point of the page.
+    fn press(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]);
+
+    /// Turns the wheel at a point of the page.
+    fn scroll(&mut self, at: [f64; 2], pixels: f64);
+
+    /// Presses a key and releases it. `code` is a value of `KeyboardEvent.code`.
+    fn strike(&mut self, code: &str);
+}
+
 /// Tab of the browser, with a `DevTools` connection.
 pub(crate) struct Tab {
     socket: WebSocket<TcpStream>,
@@ -263,6 +275,20 @@ impl Scripted for Tab {
 
     fn faults(&self) -> &[String] {
         &self.faults
+    }
+}
+
+impl Acting for Tab {
+    fn press(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]) {
+        Self::press(self, button, from, shift);
+    }
+
+    fn scroll(&mut self, at: [f64; 2], pixels: f64) {
+        self.wheel(at, pixels);
+    }
+
+    fn strike(&mut self, code: &str) {
+        self.hold(code, 0);
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-use super::browser::{PATIENCE, Scripted, announced};
+use super::browser::{Acting, PATIENCE, Scripted, announced};
 use crate::support::skip;
 
 /// Names of Firefox's program, in order of preference.
@@ -45,6 +45,12 @@ impl Firefox {
         Some(this)
     }
 
+    /// Performs actions of an input source of the kind `kind`.
+    fn perform(&mut self, kind: &str, actions: &Value) {
+        let source = json!({"type": kind, "id": kind, "actions": actions});
+        self.call("input.performActions", &json!({"context": self.tab, "actions": [source]}));
+    }
+
     fn call(&mut self, method: &str, parameters: &Value) -> Value {
         self.calls += 1;
         let call = json!({"id": self.calls, "method": method, "params": parameters});
@@ -74,6 +80,38 @@ impl Scripted for Firefox {
         let answer = self.call("script.evaluate", &parameters);
         assert_eq!(answer["type"], "success", "{expression}: {answer}");
         serde_json::from_str(answer["result"]["value"].as_str().unwrap()).unwrap()
+    }
+}
+
+impl Acting for Firefox {
+    fn press(&mut self, button: &str, [x, y]: [f64; 2], [across, down]: [f64; 2]) {
+        let button = ["left", "middle", "right"].iter().position(|name| *name == button);
+        let to = |x: f64, y: f64| json!({"type": "pointerMove", "x": x.round(), "y": y.round()});
+        let steps = [
+            to(x, y),
+            json!({"type": "pointerDown", "button": button}),
+            to(x + 0.5 * across, y + 0.5 * down),
+            to(x + across, y + down),
+            json!({"type": "pointerUp", "button": button}),
+        ];
+        self.perform("pointer", &json!(steps));
+    }
+
+    fn scroll(&mut self, [x, y]: [f64; 2], pixels: f64) {
+        let turn =
+            json!({"type": "scroll", "x": x.round(), "y": y.round(), "deltaX": 0, "deltaY": pixels.round()});
+        self.perform("wheel", &json!([turn]));
+    }
+
+    fn strike(&mut self, code: &str) {
+        // WebDriver, section 17.4.2: keys without a character have code points of the private use area.
+        let value = match code {
+            "ArrowLeft" => "\u{e012}".to_owned(),
+            "ArrowUp" => "\u{e013}".to_owned(),
+            letter => letter.trim_start_matches("Key").to_lowercase(),
+        };
+        let steps = ["keyDown", "keyUp"].map(|kind| json!({"type": kind, "value": value}));
+        self.perform("key", &json!(steps));
     }
 }
 

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use data_encoding::BASE64;
 
-use super::browser::{Browser, Scripted, Tab};
+use super::browser::{Acting, Browser, Scripted, Tab};
 use super::firefox::Firefox;
-use super::person::{Person, SETTLED};
+use super::person::{Person, SETTLED, two_lights};
+use super::random::act_with_own_host;
 use super::server::{FileServer, run_shown};
 use crate::support::{Room, scene, shipped, skip};
 
@@ -32,10 +33,18 @@ pub(super) fn module() -> Option<OsString> {
 
 /// Writes the page into the folder `site`; `None` if there is no module.
 fn site(room: &Room) -> Option<FileServer> {
+    site_of(room, &[&shipped("cornell.gltf"), &shipped("room.glb")])
+}
+
+/// Writes the page with scenes of its own into the folder `site`; `None` if there is no module.
+fn site_of(room: &Room, scenes: &[&str]) -> Option<FileServer> {
     let module = module()?;
-    let scenes = [shipped("cornell.gltf"), shipped("room.glb")];
     let mut command = room.command();
-    command.args(["page", "site", "--scene", &scenes[0], "--scene", &scenes[1], "--module"]).arg(module);
+    command.args(["page", "site"]);
+    for scene in scenes {
+        command.args(["--scene", scene]);
+    }
+    command.arg("--module").arg(module);
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     Some(FileServer::start(room.path("site")))
@@ -111,6 +120,38 @@ fn firefox_settles_to_the_same_picture() {
     std::fs::copy(shipped("cornell.gltf"), room.path("scenes/cornell.gltf")).unwrap();
     open(&mut firefox, &server, &format!("photoncard render scenes/cornell.gltf {SMALL}"));
     check_shown(&room, &mut firefox);
+}
+
+/// Performs 500 random actions on a scene with two lights, and checks the picture that they end at.
+fn check_random_actions(tab: &mut impl Acting) {
+    let room = Room::new();
+    room.write_scene("two-lights.gltf", &two_lights());
+    let Some(server) = site_of(&room, &["two-lights.gltf"]) else { return };
+    std::fs::create_dir_all(room.path("scenes")).unwrap();
+    std::fs::copy(room.path("two-lights.gltf"), room.path("scenes/two-lights.gltf")).unwrap();
+    open(tab, &server, &format!("photoncard render scenes/two-lights.gltf {SMALL}"));
+    tab.wait(SETTLED, LIMIT);
+    act_with_own_host(tab, 500);
+    // The last move of the camera may have been undone by a reset.
+    tab.press("left", [200.0, 250.0], [30.0, 10.0]);
+    tab.wait(SETTLED, LIMIT);
+    let line = tab.value("document.getElementById('command').textContent");
+    assert!(["--camera-at", "--set"].iter().all(|flag| line.as_str().unwrap().contains(flag)), "{line}");
+    check_shown(&room, tab);
+}
+
+#[test]
+fn five_hundred_random_actions_on_a_page_with_its_own_host_end_at_the_exact_picture() {
+    let Some(mut browser) = Browser::start() else { return };
+    let mut tab = browser.tab([900, 600]);
+    check_random_actions(&mut tab);
+    assert_eq!(tab.faults, Vec::<String>::new());
+}
+
+#[test]
+fn five_hundred_random_actions_in_firefox_end_at_the_exact_picture() {
+    let Some(mut firefox) = Firefox::start() else { return };
+    check_random_actions(&mut firefox);
 }
 
 #[test]
