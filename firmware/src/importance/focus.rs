@@ -23,7 +23,7 @@ const MIN_PHOTONS: f32 = 5.0;
 /// Spread from which a focus has no rays. Directions that fill a cell have spreads of 0.01 around the normal
 /// to 0.03 at the horizon, so that a cell that is far brighter than others is a focus as a whole.
 const MAX_SPREAD: f32 = 0.06;
-/// How well a focus is known by `n` photons, below that by many: less by this multiple of `1 / sqrt(n)`.
+/// Certainty that a focus of `n` photons lacks, as a multiple of `1 / sqrt(n)`.
 const DOUBT: f32 = 1.0;
 /// Height of a focus divided by the spread of its directions, for the density of [`Focus::density`].
 const HEIGHT_OF_SPREAD: f32 = 3.0;
@@ -43,11 +43,6 @@ pub(super) struct Focus {
 
 impl Focus {
     pub(super) const NONE: Self = Self { axis: [0; 2], width: 1, share: 0 };
-
-    /// The focus with another share of the rays.
-    pub(super) fn with_share(self, share: u8) -> Self {
-        Self { share, ..self }
-    }
 
     fn new(axis: Vec3, spread: f32) -> Self {
         let height = max(HEIGHT_OF_SPREAD * spread, MIN_HEIGHT);
@@ -100,7 +95,7 @@ impl Directions {
         self.squares.add(power * power);
     }
 
-    /// Focus of a cell with the flux `power`, and how well it is known: 0 to 1.
+    /// Focus of a cell with the flux `power`, and its certainty, 0 to 1.
     #[inline(never)]
     pub(super) fn focus(&self, power: f32) -> Option<(Focus, f32)> {
         let photons = power * power / self.squares.value();
@@ -111,8 +106,8 @@ impl Directions {
         let sum = Vec3::from_array(self.sum.map(Sum::value));
         let length = libm::sqrtf(sum.length_squared());
         let spread = max(1.0 - length / power, 0.0) * photons / (photons - 1.0);
-        let known = 1.0 - spread / MAX_SPREAD - DOUBT / libm::sqrtf(photons);
-        (known > 0.0).then(|| (Focus::new(sum, spread), known))
+        let certainty = 1.0 - spread / MAX_SPREAD - DOUBT / libm::sqrtf(photons);
+        (certainty > 0.0).then(|| (Focus::new(sum, spread), certainty))
     }
 }
 

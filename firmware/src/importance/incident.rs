@@ -108,8 +108,8 @@ impl IncidentFlux {
         let mut foci = [(Focus::NONE, 0.0_f32); FOCI];
         let cells = self.cells.iter().zip(&self.directions).zip(shares.cells.iter().zip(&shares.uneven));
         for ((power, directions), (share, uneven)) in cells {
-            let Some((focus, known)) = directions.focus(power.value()) else { continue };
-            let share = FOCUSED * known * uneven * uneven * uneven * share;
+            let Some((focus, certainty)) = directions.focus(power.value()) else { continue };
+            let share = FOCUSED * certainty * uneven * uneven * uneven * share;
             let least = foci.iter_mut().min_by(|(_, a), (_, b)| a.total_cmp(b));
             if let Some(least) = least.filter(|(_, least)| share > *least) {
                 *least = (focus, share);
@@ -127,7 +127,7 @@ impl IncidentFlux {
                 let least = EMPTY_CELL * mean(&cells);
                 DirectionTable::new(&cells.map(|cell| max(cell, least)), 0.0)
             }
-            // Photons have left no directions for foci by the product alone.
+            // `Product` sums no directions, and so has no foci.
             Sampling::Product | Sampling::Focused => {
                 let shares = product(&self.shrunk(), reflector);
                 DirectionTable::with_foci(&shares.cells, shares.lobe, &self.foci(&shares))

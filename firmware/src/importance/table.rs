@@ -28,7 +28,7 @@ pub struct DirectionTable {
 
 const _: () = assert!(size_of::<DirectionTable>() == 50);
 
-/// What a ray is sampled from.
+/// Entry of the table that a ray is sampled from, with the lobe and the foci apart.
 enum Source {
     Cell(u8),
     Lobe,
@@ -67,7 +67,10 @@ impl DirectionTable {
         let cells = cells.map(|cell| ((cell * scale + 0.5) as u8).max(1));
         // The conversion saturates.
         let lobe = if lobe > 0.0 { ((lobe * scale + 0.5) as u16).max(1) } else { 0 };
-        let foci = foci.map(|(focus, share)| focus.with_share((share * scale + 0.5) as u8));
+        let foci = foci.map(|(mut focus, share)| {
+            focus.share = (share * scale + 0.5) as u8;
+            focus
+        });
         Self { cells, lobe, foci }
     }
 

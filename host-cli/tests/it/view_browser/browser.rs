@@ -106,6 +106,14 @@ pub(crate) trait Scripted {
     /// Evaluates a JavaScript expression, and waits for its value if it is a promise.
     fn value(&mut self, expression: &str) -> Value;
 
+    /// Selects the entry `value` of the list with the id `list`.
+    fn choose(&mut self, list: &str, value: &str) {
+        self.value(&format!(
+            "(list => {{ list.value = '{value}'; list.dispatchEvent(new Event('input', {{bubbles: true}})); \
+             list.dispatchEvent(new Event('change', {{bubbles: true}})); }})(document.getElementById('{list}'))"
+        ));
+    }
+
     /// Waits until a JavaScript expression is true.
     fn wait(&mut self, expression: &str, limit: Duration) {
         let start = Instant::now();

@@ -125,10 +125,9 @@ fn firefox_settles_to_the_same_picture() {
 /// Performs 500 random actions on a scene with two lights, and checks the picture that they end at.
 fn check_random_actions(tab: &mut impl Acting) {
     let room = Room::new();
-    room.write_scene("two-lights.gltf", &two_lights());
-    let Some(server) = site_of(&room, &["two-lights.gltf"]) else { return };
     std::fs::create_dir_all(room.path("scenes")).unwrap();
-    std::fs::copy(room.path("two-lights.gltf"), room.path("scenes/two-lights.gltf")).unwrap();
+    room.write_scene("scenes/two-lights.gltf", &two_lights());
+    let Some(server) = site_of(&room, &["scenes/two-lights.gltf"]) else { return };
     open(tab, &server, &format!("photoncard render scenes/two-lights.gltf {SMALL}"));
     tab.wait(SETTLED, LIMIT);
     act_with_own_host(tab, 500);

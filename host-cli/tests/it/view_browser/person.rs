@@ -13,8 +13,6 @@ pub(crate) const SETTLED: &str = "window.photoncard?.isSettled";
 const LIMIT: Duration = Duration::from_secs(30);
 
 pub(crate) trait Person {
-    /// Selects the entry `value` of the list with the id `list`.
-    fn choose(&mut self, list: &str, value: &str);
     /// Sets the exposure in stops; `None` is automatic.
     fn expose(&mut self, stops: Option<f64>);
     /// Drags by `shift` pixels from a point of the picture, given in fractions of its sides. A zero shift is
@@ -45,13 +43,6 @@ pub(crate) trait Person {
 }
 
 impl Person for Tab {
-    fn choose(&mut self, list: &str, value: &str) {
-        self.value(&format!(
-            "(list => {{ list.value = '{value}'; list.dispatchEvent(new Event('input', {{bubbles: true}})); \
-             list.dispatchEvent(new Event('change', {{bubbles: true}})); }})(document.getElementById('{list}'))"
-        ));
-    }
-
     fn expose(&mut self, stops: Option<f64>) {
         let automatic = "document.getElementById('automatic')";
         match stops {

@@ -119,12 +119,6 @@ pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
 /// lose.
 pub(crate) fn act_with_own_host(tab: &mut impl Acting, actions: usize) {
     let mut numbers = Numbers(48);
-    let choose = |tab: &mut dyn Acting, list: &str, value: &str| {
-        tab.value(&format!(
-            "(list => {{ list.value = '{value}'; list.dispatchEvent(new Event('input', {{bubbles: true}})); \
-             list.dispatchEvent(new Event('change', {{bubbles: true}})); }})(document.getElementById('{list}'))"
-        ));
-    };
     for _ in 0..actions {
         let at = [numbers.of(40.0, 400.0), numbers.of(80.0, 400.0)];
         match (numbers.next() * 100.0) as u32 {
@@ -140,18 +134,18 @@ pub(crate) fn act_with_own_host(tab: &mut impl Acting, actions: usize) {
                 let message = json!({"type": "setting", "name": "sampling", "value": sampling});
                 tab.value(&format!("photoncard.connection.send({message})"));
             }
-            84..88 => choose(tab, "side", numbers.one(&["", "128"])),
-            88..94 => choose(tab, "layer", numbers.one(&["radiance", "albedo", "N", "Z"])),
+            84..88 => tab.choose("side", numbers.one(&["", "128"])),
+            88..94 => tab.choose("layer", numbers.one(&["radiance", "albedo", "N", "Z"])),
             94..98 => drop(tab.value("document.getElementById('reset').click()")),
             _ => std::thread::sleep(Duration::from_millis(numbers.of(0.0, 400.0) as u64)),
         }
     }
-    choose(tab, "side", "128");
-    choose(tab, "layer", "radiance");
+    tab.choose("side", "128");
+    tab.choose("layer", "radiance");
 }
 
 /// Types into a random field of the panel, or toggles a switch.
-fn edit(tab: &mut (impl Scripted + ?Sized), numbers: &mut Numbers) {
+fn edit(tab: &mut impl Scripted, numbers: &mut Numbers) {
     let which = numbers.next();
     let value = numbers.of(0.0, 1.0);
     tab.value(&format!(
