@@ -3,12 +3,15 @@
 //     node bake_three.mjs PHOTONCARD SCENE BAKED.glb FOLDER VIEW... [-- OPTION...]
 //
 // A view is X,Y,Z:X,Y,Z:FOV: the camera, the point that it looks at, and the vertical field of view. Options go to
-// `photoncard render`. three.js and playwright-core are those of FOLDER/node_modules, Chromium is /usr/bin/chromium or $CHROMIUM.
+// `photoncard render`, whose pictures stay in FOLDER for later runs of the same scene, view and options. three.js and playwright-core are
+// those of FOLDER/node_modules, Chromium is /usr/bin/chromium or $CHROMIUM.
 // The page has no lights, no tone mapping and no environment; pixels are read back from a float target, linear.
-// Prints for each view: mean over the render's, mean error and percentiles of the error relative to the local mean.
+// Prints for each view: mean over the render's, and percentiles of the error relative to the local mean, also of means over 5x5 pixels, in
+// which less of the render's noise is left.
 // FOLDER has PNGs: view-N-render, view-N-emissive and view-N-errors, red where the bake is too bright and blue where it is too dark,
 // full at 20 %, black where pixels do not count.
 import { execFileSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
 import { createServer } from 'node:http';
 import { readFileSync, writeFileSync, existsSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -104,14 +107,22 @@ function smooth(light, x, y) {
     return sum > 0;
 }
 
-/** Errors of pixels, relative to their light, of the sums of channels: of each, null where it does not count, and of all. */
-function errors(own, other) {
+/** Sum of the channels, averaged over the pixels at most `reach` away. */
+function blurred(light, x, y, reach) {
+    let sum = 0;
+    for (let dy = -reach; dy <= reach; dy++) for (let dx = -reach; dx <= reach; dx++) {
+        for (let c = 0; c < 3; c++) sum += light[4 * ((y + dy) * WIDTH + x + dx) + c];
+    }
+    return sum / (2 * reach + 1) ** 2;
+}
+
+/** Errors of smooth pixels, averaged over those at most `reach` away: of each, null where it does not count, and of all. */
+function errors(own, other, reach) {
     const shares = new Array(WIDTH * HEIGHT).fill(null);
     let [a, b] = [0, 0];
     for (let y = 0; y < HEIGHT; y++) for (let x = 0; x < WIDTH; x++) {
         if (!smooth(other, x, y)) continue;
-        const sum = light => [0, 1, 2].reduce((sum, c) => sum + light[4 * (y * WIDTH + x) + c], 0);
-        const [mine, theirs] = [sum(own), sum(other)];
+        const [mine, theirs] = [own, other].map(light => blurred(light, x, y, reach));
         [a, b] = [a + mine, b + theirs];
         shares[y * WIDTH + x] = (mine - theirs) / theirs;
     }
@@ -138,10 +149,12 @@ await tab.evaluate('load()');
 const shown = [];
 for (const [number, view] of views.entries()) {
     const [at, to, fov] = view.split(':');
-    const exr = join(folder, `view-${number}.exr`);
-    execFileSync(photoncard, ['render', scene, '--camera-at', at, '--look-at', to, '--fov', fov, '--size', `${WIDTH}x${HEIGHT}`,
-        '--quiet', ...options, '--sample-type', 'float', '-o', exr, '-o', join(folder, `view-${number}-render.png`), '--tonemap', 'none'],
-        { stdio: ['ignore', 'ignore', 'inherit'] });
+    const asked = ['render', scene, '--camera-at', at, '--look-at', to, '--fov', fov, '--size', `${WIDTH}x${HEIGHT}`,
+        '--sample-type', 'float', ...options];
+    const key = createHash('sha256').update(JSON.stringify(asked)).update(readFileSync(scene)).digest('hex').slice(0, 12);
+    const exr = join(folder, `render-${key}.exr`);
+    if (!existsSync(exr)) execFileSync(photoncard, [...asked, '--quiet', '-o', exr], { stdio: ['ignore', 'ignore', 'inherit'] });
+    execFileSync(photoncard, ['tonemap', exr, '--tonemap', 'none', '-o', join(folder, `view-${number}-render.png`)], { stdio: 'inherit' });
     files[`/${number}.exr`] = exr;
     shown.push([at.split(',').map(Number), to.split(',').map(Number), Number(fov), `/${number}.exr`]);
 }
@@ -150,10 +163,11 @@ for (const form of ['emissive', 'unlit']) {
     for (const [number, view] of shown.entries()) {
         const { png, own, other } = await tab.evaluate(view => show(...view), view);
         writePng(`view-${number}-${form}.png`, png);
-        const { shares, pixels, mean, median, p95, p99 } = errors(own, other);
+        const { shares, pixels, mean, median, p95, p99 } = errors(own, other, 0), blocks = errors(own, other, 2);
         const percent = share => `${(100 * share).toFixed(2)} %`;
         console.log(`${form} view ${number}: ${pixels} pixels, mean ${percent(mean - 1)} off, median ${percent(median)}, ` +
-            `95 % within ${percent(p95)}, 99 % within ${percent(p99)}`);
+            `95 % within ${percent(p95)}, 99 % within ${percent(p99)}; of blocks of 5x5, median ${percent(blocks.median)}, ` +
+            `95 % within ${percent(blocks.p95)}`);
         if (form === 'emissive') writePng(`view-${number}-errors.png`, await tab.evaluate(shares => paint(shares), shares));
     }
 }

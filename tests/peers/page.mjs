@@ -1,5 +1,5 @@
 // Times a page that has its own host beside the native program, on equally many cards: seconds to the first and to the settled picture, and CPU
-// seconds of all processes.
+// seconds of all processes. Fails if the EXR that the page saves is not the one that the command writes, byte for byte.
 //
 // usage: node --experimental-websocket tests/peers/page.mjs PHOTONCARD SITE [SCENE ...]
 // SITE is a folder by `photoncard page`; a SCENE is one of it, such as scenes/cornell.gltf. It takes Chromium and a machine without other work.
@@ -35,6 +35,19 @@ const server = createServer(({ url }, answer) => {
 await new Promise(act => server.once("listening", act));
 const address = `http://127.0.0.1:${server.address().port}/`;
 
+/** The EXR that the page saves, as bytes. */
+async function save(tab) {
+    await tab.value(`(() => {
+        URL.createObjectURL = blob => (blob.arrayBuffer().then(bytes =>
+            window.taken = btoa(Array.from(new Uint8Array(bytes), byte => String.fromCharCode(byte)).join(""))), "blob:none");
+        HTMLAnchorElement.prototype.click = () => { };
+        document.getElementById("save-exr").click();
+        return true;
+    })()`);
+    if (!await tab.until("window.taken", LIMIT)) throw new Error("the page saves no EXR");
+    return Buffer.from(await tab.value("window.taken"), "base64");
+}
+
 async function browse(command) {
     const tab = await Tab.open(), begun = Date.now();
     await tab.go(`${address}#${encodeURIComponent(command)}`);
@@ -42,9 +55,9 @@ async function browse(command) {
     const first = Date.now();
     if (!await tab.until("window.photoncard.isSettled", LIMIT)) throw new Error(`${command} does not settle`);
     const settled = Date.now(), cpu = tab.cpuBetween(begun, settled);
-    const shown = await tab.value("document.getElementById('command').textContent");
+    const shown = await tab.value("document.getElementById('command').textContent"), saved = await save(tab);
     await tab.close();
-    return { first: (first - begun) / 1000, settled: (settled - begun) / 1000, cpu, command: shown };
+    return { first: (first - begun) / 1000, settled: (settled - begun) / 1000, cpu, command: shown, saved };
 }
 
 function native(command, cards) {
@@ -54,8 +67,9 @@ function native(command, cards) {
     const run = spawnSync("bash", words, { env: { ...process.env, PATH: `${resolve(program, "..")}:${process.env.PATH}` }, encoding: "utf8" });
     if (run.status !== 0) throw new Error(run.stderr);
     const [user, system] = run.stderr.trim().split("\n").pop().split(" ").map(Number);
+    const wall = (performance.now() - begun) / 1000, written = readFileSync(join(folder, "picture.exr"));
     rmSync(folder, { recursive: true });
-    return { wall: (performance.now() - begun) / 1000, cpu: user + system };
+    return { wall, cpu: user + system, written };
 }
 
 console.log("| scene | cards | first, s | settled, s | CPU s | native, s | CPU s | CPU, times |");
@@ -64,6 +78,7 @@ for (const scene of scenes) {
     for (const cards of [1, 2]) {
         const page = await browse(`photoncard render ${scene} --quality draft --size 256x256 --card emulated:${cards}`);
         const alone = native(page.command, cards);
+        if (!page.saved.equals(alone.written)) throw new Error(`the saved EXR differs from that of ${page.command}`);
         const seconds = number => number.toFixed(1);
         console.log(`| ${scene} | ${cards} | ${seconds(page.first)} | ${seconds(page.settled)} | ${seconds(page.cpu)} | ${seconds(alone.wall)} | ${seconds(alone.cpu)} | ${seconds(page.cpu / alone.cpu)} |`);
     }

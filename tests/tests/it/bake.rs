@@ -355,3 +355,41 @@ fn the_file_is_valid_and_loads_with_its_surfaces_and_its_light() {
         }
     }
 }
+
+#[test]
+fn a_dim_surface_keeps_its_light_beside_a_bright_one_of_its_object() {
+    let mut triangles = square(0.5, 0.0, true, 0).to_vec();
+    triangles.extend(square(0.5, 1.0, false, 0));
+    let original = scene(triangles, vec![lit("shade", 0.5, 1.0)], camera(Vec3::ZERO, Vec3::NEG_Z));
+    let (plan, mut baked) = bake(&original, 4.0, &fewer());
+    let light = [Vec3::new(500.0, 300.0, 100.0), Vec3::new(0.7, 0.5, 0.3)];
+    assert_eq!((plan.atlas().charts.len(), baked.radiance.len()), (2, 1));
+    let page = &mut baked.radiance[0];
+    for (value, chart) in page.values.iter_mut().zip(&page.charts) {
+        *value = light.get(*chart as usize).copied().unwrap_or_default();
+    }
+    let bytes = write(&plan, &baked, MaterialForm::Baked, &[]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("baked.glb"), bytes).unwrap();
+    let loaded = gltf::load(&folder.path().join("baked.glb")).unwrap();
+    let shown = |triangle: &Triangle| {
+        let material = &loaded.materials[triangle.material as usize];
+        let texture = &loaded.textures[material.emissive_texture.unwrap() as usize];
+        let image = &loaded.images[texture.image as usize];
+        let corners = loaded.attributes[triangle.attributes as usize].coordinates[texture.set as usize];
+        let place = corners.iter().sum::<Vec2>() * (image.width as f32 / 3.0);
+        let texel = image.texels[place.y as usize * image.width as usize + place.x as usize];
+        let linear = |code: u8| ((f32::from(code) / 255.0 + 0.055) / 1.055).powf(2.4);
+        material.emission * Vec3::new(linear(texel[0]), linear(texel[1]), linear(texel[2]))
+    };
+    for triangle in &loaded.triangles {
+        let expected = light[usize::from(triangle.vertices[0].y > 0.5) ^ usize::from(is_high_first(&plan))];
+        let error = shown(triangle) / expected - Vec3::ONE;
+        assert!(error.abs().max_element() < 0.03, "{error} of {expected}");
+    }
+}
+
+/// Returns whether the first chart is the higher one.
+fn is_high_first(plan: &Plan) -> bool {
+    plan.surfaces().triangle(plan.atlas().charts[0].triangles[0]).vertices[0].y > 0.5
+}

@@ -11,7 +11,7 @@ use super::baked::Baked;
 use super::error::BakeError;
 use super::file::File;
 use super::materials::Materials;
-use super::pages::{Page, scales, srgb_png};
+use super::pages::{Scales, srgb_png};
 use super::plan::Plan;
 use super::surfaces::{Primitive, Surfaces};
 
@@ -47,9 +47,8 @@ struct Writer<'a> {
     plan: &'a Plan,
     form: MaterialForm,
     materials: Materials<'a>,
-    /// Scale of each primitive's values.
-    scales: Vec<f32>,
-    /// Places of each triangle's corners on its page, and the page.
+    scales: Scales,
+    /// Chart of each triangle, and places of its corners on the chart's page.
     places: BTreeMap<u32, (u32, [DVec2; 3])>,
     /// Texture of each page.
     textures: Vec<usize>,
@@ -73,15 +72,19 @@ pub fn write(plan: &Plan, baked: &Baked, form: MaterialForm, rgbm: &[String]) ->
         MaterialForm::Kept => &baked.irradiance,
     };
     let mut file = File::default();
-    let scales = scales_of(pages, surfaces.primitives.len(), form);
+    let scales = match form {
+        MaterialForm::Baked => Scales::of_charts(pages),
+        // A program multiplies lightmaps.
+        MaterialForm::Kept => Scales::even(pages),
+    };
     let mut textures = Vec::with_capacity(pages.len());
     for (number, page) in pages.iter().enumerate() {
         let image = file.image(&format!("lightmap {number}"), &srgb_png(page, &scales)?);
         textures.push(file.texture(image, FILTERS, CLAMPED));
     }
-    let places = plan.atlas().charts.iter().flat_map(|chart| {
-        let of_page = |places: &[DVec2; 3]| (chart.page, *places);
-        chart.triangles.iter().copied().zip(chart.places.iter().map(of_page))
+    let places = (0..).zip(&plan.atlas().charts).flat_map(|(index, chart)| {
+        let of_chart = move |places: &[DVec2; 3]| (index, *places);
+        chart.triangles.iter().copied().zip(chart.places.iter().map(of_chart))
     });
     let places = places.collect();
     let materials = Materials::new(&surfaces.scene);
@@ -102,28 +105,18 @@ pub fn write(plan: &Plan, baked: &Baked, form: MaterialForm, rgbm: &[String]) ->
     file.finish(&roots, &extras.into())
 }
 
-/// Scale of each primitive's values: its own for baked materials, so that lamps do not coarsen walls; one of
-/// all for lightmaps that a program multiplies.
-fn scales_of(pages: &[Page], count: usize, form: MaterialForm) -> Vec<f32> {
-    let own = scales(pages, count);
-    match form {
-        MaterialForm::Baked => own,
-        MaterialForm::Kept => vec![own.into_iter().fold(0.0, f32::max); count],
-    }
-}
-
 impl Writer<'_> {
     fn object(&mut self, file: &mut File, primitives: &[(usize, &Primitive)]) -> Result<(), BakeError> {
         let mut written = Vec::new();
         for &(number, primitive) in primitives {
-            // The charts of a primitive may lie on several pages, each of which is a material.
-            let mut by_page: BTreeMap<Option<u32>, Vec<u32>> = BTreeMap::new();
+            // The charts of a primitive may lie on several pages and have several scales: each is a material.
+            let mut parts: BTreeMap<Option<(u32, u32)>, Vec<u32>> = BTreeMap::new();
             for &triangle in &primitive.triangles {
-                let page = self.places.get(&triangle).map(|(page, _)| *page);
-                by_page.entry(page).or_default().push(triangle);
+                parts.entry(self.light(number as u32, triangle)).or_default().push(triangle);
             }
-            for (page, triangles) in by_page {
-                written.push(self.primitive(file, (number, primitive), page, &triangles)?);
+            for (part, triangles) in parts {
+                let light = part.map(|(page, scale)| (page, f32::from_bits(scale)));
+                written.push(self.primitive(file, primitive, light, &triangles)?);
             }
         }
         let object = primitives.first().map_or(0, |(_, primitive)| primitive.object);
@@ -133,11 +126,19 @@ impl Writer<'_> {
         Ok(())
     }
 
+    /// Page of a triangle and the bits of its scale there; `None` without a lightmap.
+    fn light(&self, primitive: u32, triangle: u32) -> Option<(u32, u32)> {
+        let (chart, _) = self.places.get(&triangle)?;
+        let page = self.plan.atlas().charts.get(*chart as usize)?.page;
+        Some((page, self.scales.of(primitive, *chart).to_bits()))
+    }
+
+    /// Part of a primitive; `light` is its page and scale.
     fn primitive(
         &mut self,
         file: &mut File,
-        (number, primitive): (usize, &Primitive),
-        page: Option<u32>,
+        primitive: &Primitive,
+        light: Option<(u32, f32)>,
         triangles: &[u32],
     ) -> Result<Value, BakeError> {
         let vertices = self.vertices(triangles);
@@ -147,12 +148,12 @@ impl Writer<'_> {
         add("POSITION", file.vectors(&values::<3>(corners, 0), true));
         add("NORMAL", file.vectors(&values::<3>(corners, 3), false));
         add("TEXCOORD_0", file.vectors(&values::<2>(corners, 6), false));
-        if page.is_some() {
+        if light.is_some() {
             add("TEXCOORD_1", file.vectors(&values::<2>(corners, 10), false));
         }
         let second = values::<2>(corners, 8);
         if second.iter().any(|place| *place != [0.0; 2]) {
-            let name = if page.is_some() { "TEXCOORD_2" } else { "TEXCOORD_1" };
+            let name = if light.is_some() { "TEXCOORD_2" } else { "TEXCOORD_1" };
             add(name, file.vectors(&second, false));
         }
         let colours = values::<4>(corners, 12);
@@ -160,20 +161,20 @@ impl Writer<'_> {
             add("COLOR_0", file.vectors(&colours, false));
         }
         let indices = file.indices(&vertices.indices);
-        let material = self.material(file, (number, primitive), page)?;
+        let material = self.material(file, primitive, light)?;
         Ok(json!({ "attributes": attributes, "indices": indices, "material": material }))
     }
 
     fn material(
         &mut self,
         file: &mut File,
-        (number, primitive): (usize, &Primitive),
-        page: Option<u32>,
+        primitive: &Primitive,
+        light: Option<(u32, f32)>,
     ) -> Result<usize, BakeError> {
         let surfaces = self.plan.surfaces();
         let Some(material) = surfaces.scene.materials.get(primitive.material as usize) else { return Ok(0) };
-        let page = page.and_then(|page| self.textures.get(page as usize).copied());
-        let Some(texture) = page else {
+        let light = light.and_then(|(page, scale)| Some((*self.textures.get(page as usize)?, scale)));
+        let Some((texture, scale)) = light else {
             if let Some(&written) = self.kept.get(&primitive.material) {
                 return Ok(written);
             }
@@ -182,7 +183,6 @@ impl Writer<'_> {
             self.kept.insert(primitive.material, file.materials.len() - 1);
             return Ok(file.materials.len() - 1);
         };
-        let scale = self.scales.get(number).copied().unwrap_or(0.0);
         let mut written = match self.form {
             MaterialForm::Baked => self.materials.baked(file, material, [0, 2], (texture, scale))?,
             MaterialForm::Kept => self.materials.kept(file, material, [0, 2])?,

@@ -1,5 +1,7 @@
 //! Pages: values of all texels, filled where no light was measured, and their 8-bit codes.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::atlas::Atlas;
@@ -129,17 +131,55 @@ fn mean(values: impl Iterator<Item = Vec3>) -> Option<Vec3> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// Greatest value of each of `count` primitives on the pages; 0 for dark ones.
-pub(super) fn scales(pages: &[Page], count: usize) -> Vec<f32> {
-    let mut scales = vec![0.0_f32; count];
-    for page in pages {
-        for ((value, chart), primitive) in page.values.iter().zip(&page.charts).zip(&page.primitives) {
-            if let Some(scale) = scales.get_mut(*primitive as usize).filter(|_| *chart != NO_CHART) {
-                *scale = scale.max(value.max_element());
+/// Ratio of neighbouring scales of a primitive's charts.
+const SCALE_RATIO: f32 = 8.0;
+
+/// Values that are the code 1 of 8 bits, for each chart of each primitive. The charts of one primitive have
+/// few different scales, each of which is a material.
+pub(super) struct Scales(BTreeMap<(u32, u32), f32>);
+
+impl Scales {
+    /// The primitive's greatest value divided by the greatest power of [`SCALE_RATIO`] at which the chart's
+    /// values do not exceed it. The bright inside of a lamp does not coarsen the steps of its outside.
+    pub(super) fn of_charts(pages: &[Page]) -> Self {
+        let mut scales: BTreeMap<(u32, u32), f32> = BTreeMap::new();
+        for page in pages {
+            for ((value, &chart), &primitive) in page.values.iter().zip(&page.charts).zip(&page.primitives) {
+                if chart != NO_CHART {
+                    let greatest = scales.entry((primitive, chart)).or_default();
+                    *greatest = greatest.max(value.max_element());
+                }
             }
         }
+        let mut of_primitives: BTreeMap<u32, f32> = BTreeMap::new();
+        for (&(primitive, _), &own) in &scales {
+            let greatest = of_primitives.entry(primitive).or_default();
+            *greatest = greatest.max(own);
+        }
+        for ((primitive, _), scale) in scales.iter_mut().filter(|(_, scale)| **scale > 0.0) {
+            let (own, mut least) = (*scale, of_primitives.get(primitive).copied().unwrap_or_default());
+            while least / SCALE_RATIO >= own {
+                least /= SCALE_RATIO;
+            }
+            *scale = least;
+        }
+        Self(scales)
     }
-    scales
+
+    /// The greatest value of all, for every chart.
+    pub(super) fn even(pages: &[Page]) -> Self {
+        let Self(mut scales) = Self::of_charts(pages);
+        let greatest = scales.values().copied().fold(0.0, f32::max);
+        scales.values_mut().for_each(|scale| *scale = greatest);
+        Self(scales)
+    }
+
+    /// Scale of a chart of a primitive; 0 if it is dark. A primitive that has no texel of the chart shows
+    /// those of another one.
+    pub(super) fn of(&self, primitive: u32, chart: u32) -> f32 {
+        let of_another = || self.0.iter().find(|((_, other), _)| *other == chart).map(|(_, scale)| scale);
+        self.0.get(&(primitive, chart)).or_else(of_another).copied().unwrap_or_default()
+    }
 }
 
 /// Greatest value of all pages.
@@ -151,15 +191,17 @@ pub(super) fn greatest(pages: &[Page]) -> f32 {
     pages.iter().map(of_page).fold(0.0, f32::max)
 }
 
-/// PNG of a page, sRGB, of values divided by the scales of their primitives. Ordered noise before the
-/// rounding keeps slow gradients from showing steps.
+/// PNG of a page, sRGB, of values divided by their scales. Ordered noise before the rounding keeps slow
+/// gradients from showing steps.
 ///
 /// # Errors
 /// If the encoder fails.
-pub(super) fn srgb_png(page: &Page, scales: &[f32]) -> Result<Vec<u8>, BakeError> {
+pub(super) fn srgb_png(page: &Page, scales: &Scales) -> Result<Vec<u8>, BakeError> {
     let mut codes = Vec::with_capacity(page.values.len() * 3);
-    for (index, (value, primitive)) in page.values.iter().zip(&page.primitives).enumerate() {
-        let scale = scales.get(*primitive as usize).copied().unwrap_or(0.0);
+    for (index, (value, (&primitive, &chart))) in
+        page.values.iter().zip(page.primitives.iter().zip(&page.charts)).enumerate()
+    {
+        let scale = scales.of(primitive, chart);
         let share = if scale > 0.0 { *value / scale } else { Vec3::ZERO };
         for (channel, share) in share.to_array().into_iter().enumerate() {
             codes.push(code(srgb(share), noise(index, page.size, channel)));
@@ -248,6 +290,19 @@ mod tests {
             let mean = codes.sum::<f64>() / 4096.0;
             assert!((mean - f64::from(share) * 255.0).abs() < 0.03, "{share}: {mean}");
         }
+    }
+
+    #[test]
+    fn dark_charts_have_scales_of_their_own() {
+        let mut page = Page::new(2);
+        page.charts = vec![0, 1, 2, 3];
+        page.primitives = vec![0, 0, 0, 1];
+        page.values = [800.0, 99.0, 0.7, 0.0].map(Vec3::splat).to_vec();
+        let scales = Scales::of_charts(std::slice::from_ref(&page));
+        let found = [(0, 0), (0, 1), (0, 2), (1, 3)].map(|(primitive, chart)| scales.of(primitive, chart));
+        assert_eq!(found, [800.0, 100.0, 800.0 / 512.0, 0.0]);
+        let even = Scales::even(&[page]);
+        assert_eq!([(0, 0), (0, 2)].map(|(primitive, chart)| even.of(primitive, chart)), [800.0; 2]);
     }
 
     #[test]

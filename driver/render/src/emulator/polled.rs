@@ -7,6 +7,9 @@ use photoncard_firmware::card::Card;
 use super::dram::EmulatedDram;
 use super::{Emulated, SharedImage};
 
+/// Steps of work between two looks at the clock, which takes a browser as long as a short step.
+const STEPS: usize = 16;
+
 /// An emulated card that is called with the bytes of its host, such as in a worker of a browser. Its memory
 /// grows as it is written.
 pub struct PolledCard {
@@ -25,12 +28,12 @@ impl PolledCard {
     pub fn go_on(&mut self, received: &[u8], longest: Duration, sent: &mut Vec<u8>) -> bool {
         let start = Instant::now();
         self.card.feed(received);
-        loop {
+        for step in 0_usize.. {
             self.send(sent);
             if !self.card.is_busy() {
                 break;
             }
-            if start.elapsed() >= longest {
+            if step % STEPS == 0 && start.elapsed() >= longest {
                 return true;
             }
             self.card.work();
