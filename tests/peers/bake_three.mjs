@@ -3,11 +3,11 @@
 //     node bake_three.mjs PHOTONCARD SCENE BAKED.glb FOLDER VIEW... [-- OPTION...]
 //
 // A view is X,Y,Z:X,Y,Z:FOV: the camera, the point that it looks at, and the vertical field of view. Options go to
-// `photoncard render`, whose pictures stay in FOLDER for later runs of the same scene, view and options. three.js and playwright-core are
+// `photoncard render`, whose pictures stay in FOLDER for later runs of the same program, scene file, view and options. three.js and playwright-core are
 // those of FOLDER/node_modules, Chromium is /usr/bin/chromium or $CHROMIUM.
 // The page has no lights, no tone mapping and no environment; pixels are read back from a float target, linear.
-// Prints for each view: mean over the render's, and percentiles of the error relative to the local mean, also of means over 5x5 pixels, in
-// which less of the render's noise is left.
+// Prints for each view: mean over the render's, and percentiles of the error relative to the local mean, also of means over the 5x5
+// pixels around each, in which less of the render's noise is left.
 // FOLDER has PNGs: view-N-render, view-N-emissive and view-N-errors, red where the bake is too bright and blue where it is too dark,
 // full at 20 %, black where pixels do not count.
 import { execFileSync } from 'node:child_process';
@@ -127,6 +127,7 @@ function errors(own, other, reach) {
         shares[y * WIDTH + x] = (mine - theirs) / theirs;
     }
     const found = shares.filter(share => share !== null).map(Math.abs).sort((a, b) => a - b);
+    if (!found.length) throw new Error('no pixel of the render is away from its silhouettes');
     const percentile = share => found[Math.min(found.length - 1, Math.floor(share * found.length))];
     return { shares, pixels: found.length, mean: a / b, median: percentile(0.5), p95: percentile(0.95), p99: percentile(0.99) };
 }
@@ -151,7 +152,8 @@ for (const [number, view] of views.entries()) {
     const [at, to, fov] = view.split(':');
     const asked = ['render', scene, '--camera-at', at, '--look-at', to, '--fov', fov, '--size', `${WIDTH}x${HEIGHT}`,
         '--sample-type', 'float', ...options];
-    const key = createHash('sha256').update(JSON.stringify(asked)).update(readFileSync(scene)).digest('hex').slice(0, 12);
+    const key = [photoncard, scene].reduce((sum, file) => sum.update(readFileSync(file)), createHash('sha256').update(JSON.stringify(asked)))
+        .digest('hex').slice(0, 12);
     const exr = join(folder, `render-${key}.exr`);
     if (!existsSync(exr)) execFileSync(photoncard, [...asked, '--quiet', '-o', exr], { stdio: ['ignore', 'ignore', 'inherit'] });
     execFileSync(photoncard, ['tonemap', exr, '--tonemap', 'none', '-o', join(folder, `view-${number}-render.png`)], { stdio: 'inherit' });

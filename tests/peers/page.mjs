@@ -50,14 +50,17 @@ async function save(tab) {
 
 async function browse(command) {
     const tab = await Tab.open(), begun = Date.now();
-    await tab.go(`${address}#${encodeURIComponent(command)}`);
-    if (!await tab.until("window.photoncard?.picture?.isWhole", LIMIT)) throw new Error(`no picture of ${command}`);
-    const first = Date.now();
-    if (!await tab.until("window.photoncard.isSettled", LIMIT)) throw new Error(`${command} does not settle`);
-    const settled = Date.now(), cpu = tab.cpuBetween(begun, settled);
-    const shown = await tab.value("document.getElementById('command').textContent"), saved = await save(tab);
-    await tab.close();
-    return { first: (first - begun) / 1000, settled: (settled - begun) / 1000, cpu, command: shown, saved };
+    try {
+        await tab.go(`${address}#${encodeURIComponent(command)}`);
+        if (!await tab.until("window.photoncard?.picture?.isWhole", LIMIT)) throw new Error(`no picture of ${command}`);
+        const first = Date.now();
+        if (!await tab.until("window.photoncard.isSettled", LIMIT)) throw new Error(`${command} does not settle`);
+        const settled = Date.now(), cpu = tab.cpuBetween(begun, settled);
+        const shown = await tab.value("document.getElementById('command').textContent"), saved = await save(tab);
+        return { first: (first - begun) / 1000, settled: (settled - begun) / 1000, cpu, command: shown, saved };
+    } finally {
+        await tab.close();
+    }
 }
 
 function native(command, cards) {

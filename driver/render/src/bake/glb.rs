@@ -1,5 +1,5 @@
 //! The scene with its lightmaps as a glb file: a node and a mesh for each object, a primitive for each
-//! material.
+//! material, page and scale.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -73,9 +73,9 @@ pub fn write(plan: &Plan, baked: &Baked, form: MaterialForm, rgbm: &[String]) ->
     };
     let mut file = File::default();
     let scales = match form {
-        MaterialForm::Baked => Scales::of_charts(pages),
+        MaterialForm::Baked => Scales::of_charts(pages, surfaces.primitives.len(), plan.atlas().charts.len()),
         // A program multiplies lightmaps.
-        MaterialForm::Kept => Scales::even(pages),
+        MaterialForm::Kept => Scales::even(pages, surfaces.primitives.len()),
     };
     let mut textures = Vec::with_capacity(pages.len());
     for (number, page) in pages.iter().enumerate() {

@@ -1,7 +1,5 @@
 //! Pages: values of all texels, filled where no light was measured, and their 8-bit codes.
 
-use std::collections::BTreeMap;
-
 use glam::Vec3;
 
 use super::atlas::Atlas;
@@ -131,54 +129,56 @@ fn mean(values: impl Iterator<Item = Vec3>) -> Option<Vec3> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// Ratio of neighbouring scales of a primitive's charts.
-const SCALE_RATIO: f32 = 8.0;
+/// Divisors of a primitive's greatest value, by which its charts have their scales.
+const DIVISORS: [f32; 5] = [4096.0, 512.0, 64.0, 8.0, 1.0];
 
-/// Values that are the code 1 of 8 bits, for each chart of each primitive. The charts of one primitive have
-/// few different scales, each of which is a material.
-pub(super) struct Scales(BTreeMap<(u32, u32), f32>);
+/// Values that have the greatest of 256 codes: those of a primitive, divided by one of
+/// [`DIVISORS`] on its dim charts. The bright inside of a lamp does not coarsen the steps of its outside.
+pub(super) struct Scales {
+    /// Greatest value of each primitive; 0 for dark ones.
+    greatest: Vec<f32>,
+    /// Divisor on each chart. It is 1 on charts of several primitives: at their borders a texel is seen on
+    /// both.
+    divisors: Vec<f32>,
+}
 
 impl Scales {
-    /// The primitive's greatest value divided by the greatest power of [`SCALE_RATIO`] at which the chart's
-    /// values do not exceed it. The bright inside of a lamp does not coarsen the steps of its outside.
-    pub(super) fn of_charts(pages: &[Page]) -> Self {
-        let mut scales: BTreeMap<(u32, u32), f32> = BTreeMap::new();
+    /// Scales of the charts on the pages, by the charts' greatest values.
+    pub(super) fn of_charts(pages: &[Page], primitives: usize, charts: usize) -> Self {
+        let mut greatest = vec![0.0_f32; primitives];
+        let mut of_charts: Vec<Option<(u32, f32)>> = vec![None; charts];
+        let mut is_shared = vec![false; charts];
         for page in pages {
             for ((value, &chart), &primitive) in page.values.iter().zip(&page.charts).zip(&page.primitives) {
-                if chart != NO_CHART {
-                    let greatest = scales.entry((primitive, chart)).or_default();
-                    *greatest = greatest.max(value.max_element());
-                }
+                let place = (greatest.get_mut(primitive as usize), of_charts.get_mut(chart as usize));
+                let (Some(of_primitive), Some(of_chart)) = place else { continue };
+                let value = value.max_element();
+                *of_primitive = of_primitive.max(value);
+                let (first, of_chart) = of_chart.get_or_insert((primitive, 0.0));
+                *of_chart = of_chart.max(value);
+                is_shared[chart as usize] |= *first != primitive;
             }
         }
-        let mut of_primitives: BTreeMap<u32, f32> = BTreeMap::new();
-        for (&(primitive, _), &own) in &scales {
-            let greatest = of_primitives.entry(primitive).or_default();
-            *greatest = greatest.max(own);
-        }
-        for ((primitive, _), scale) in scales.iter_mut().filter(|(_, scale)| **scale > 0.0) {
-            let (own, mut least) = (*scale, of_primitives.get(primitive).copied().unwrap_or_default());
-            while least / SCALE_RATIO >= own {
-                least /= SCALE_RATIO;
+        let divisor = |(of_chart, is_shared): (&Option<(u32, f32)>, bool)| match of_chart {
+            Some((primitive, own)) if *own > 0.0 && !is_shared => {
+                let fits = |divisor: &f32| greatest[*primitive as usize] / divisor >= *own;
+                DIVISORS.into_iter().find(fits).unwrap_or(1.0)
             }
-            *scale = least;
-        }
-        Self(scales)
+            _ => 1.0,
+        };
+        let divisors = of_charts.iter().zip(is_shared).map(divisor).collect();
+        Self { greatest, divisors }
     }
 
-    /// The greatest value of all, for every chart.
-    pub(super) fn even(pages: &[Page]) -> Self {
-        let Self(mut scales) = Self::of_charts(pages);
-        let greatest = scales.values().copied().fold(0.0, f32::max);
-        scales.values_mut().for_each(|scale| *scale = greatest);
-        Self(scales)
+    /// The greatest value of all, for every primitive and chart.
+    pub(super) fn even(pages: &[Page], primitives: usize) -> Self {
+        Self { greatest: vec![greatest(pages); primitives], divisors: Vec::new() }
     }
 
-    /// Scale of a chart of a primitive; 0 if it is dark. A primitive that has no texel of the chart shows
-    /// those of another one.
+    /// Scale of a primitive on a chart; 0 if the primitive is dark.
     pub(super) fn of(&self, primitive: u32, chart: u32) -> f32 {
-        let of_another = || self.0.iter().find(|((_, other), _)| *other == chart).map(|(_, scale)| scale);
-        self.0.get(&(primitive, chart)).or_else(of_another).copied().unwrap_or_default()
+        let greatest = self.greatest.get(primitive as usize).copied().unwrap_or_default();
+        greatest / self.divisors.get(chart as usize).copied().unwrap_or(1.0)
     }
 }
 
@@ -293,16 +293,23 @@ mod tests {
     }
 
     #[test]
-    fn dark_charts_have_scales_of_their_own() {
-        let mut page = Page::new(2);
-        page.charts = vec![0, 1, 2, 3];
-        page.primitives = vec![0, 0, 0, 1];
-        page.values = [800.0, 99.0, 0.7, 0.0].map(Vec3::splat).to_vec();
-        let scales = Scales::of_charts(std::slice::from_ref(&page));
-        let found = [(0, 0), (0, 1), (0, 2), (1, 3)].map(|(primitive, chart)| scales.of(primitive, chart));
-        assert_eq!(found, [800.0, 100.0, 800.0 / 512.0, 0.0]);
-        let even = Scales::even(&[page]);
-        assert_eq!([(0, 0), (0, 2)].map(|(primitive, chart)| even.of(primitive, chart)), [800.0; 2]);
+    fn dim_charts_of_one_primitive_have_scales_of_their_own() {
+        let mut page = Page::new(3);
+        // A bright chart, two dim ones, one at the very ratio, a dark one, and one of two primitives.
+        page.charts = vec![0, 1, 2, 3, 4, 5, 5, NO_CHART, NO_CHART];
+        page.primitives = vec![0, 0, 0, 0, 0, 0, 1, 0, 0];
+        page.values = [800.0, 99.0, 0.01, 100.0, 0.0, 0.5, 3.0, 0.0, 0.0].map(Vec3::splat).to_vec();
+        let of = |scales: &Scales, pairs: &[(u32, u32)]| -> Vec<f32> {
+            pairs.iter().map(|&(primitive, chart)| scales.of(primitive, chart)).collect()
+        };
+        let scales = Scales::of_charts(std::slice::from_ref(&page), 2, 7);
+        assert_eq!(of(&scales, &[(0, 0), (0, 1), (0, 3)]), [800.0, 100.0, 100.0]);
+        assert_eq!(of(&scales, &[(0, 2), (0, 4), (0, 5), (1, 5)]), [800.0 / 4096.0, 800.0, 800.0, 3.0]);
+        // A chart without texels, and texels without a chart.
+        assert_eq!(of(&scales, &[(0, 6), (1, NO_CHART)]), [800.0, 3.0]);
+        assert_eq!(of(&Scales::even(std::slice::from_ref(&page), 2), &[(0, 0), (1, 5), (1, 6)]), [800.0; 3]);
+        page.values[0] = Vec3::INFINITY;
+        assert_eq!(Scales::of_charts(&[page], 2, 7).of(0, 1), f32::INFINITY);
     }
 
     #[test]

@@ -144,7 +144,7 @@ fn read_part(path: &Path, whole: &Whole) -> Result<(Part, Vec<Light>), BakeError
     }
     let number = |bytes: &[u8; 8]| f64::from_le_bytes(*bytes);
     let numbers: Vec<f64> = light.as_chunks::<8>().0.iter().map(number).collect();
-    if !numbers.iter().all(|number| number.is_finite() && *number >= 0.0) {
+    if !numbers.iter().all(|number| (0.0..=f64::from(f32::MAX)).contains(number)) {
         return Err(damaged());
     }
     Ok((part, numbers.as_chunks::<3>().0.to_vec()))

@@ -7,7 +7,7 @@ use photoncard_firmware::card::Card;
 use super::dram::EmulatedDram;
 use super::{Emulated, SharedImage};
 
-/// Steps of work between two looks at the clock, which takes a browser as long as a short step.
+/// Steps of work between two readings of the clock. A reading takes as long as a short step in a browser.
 const STEPS: usize = 16;
 
 /// An emulated card that is called with the bytes of its host, such as in a worker of a browser. Its memory
@@ -33,7 +33,7 @@ impl PolledCard {
             if !self.card.is_busy() {
                 break;
             }
-            if step % STEPS == 0 && start.elapsed() >= longest {
+            if step.is_multiple_of(STEPS) && start.elapsed() >= longest {
                 return true;
             }
             self.card.work();
