@@ -318,6 +318,13 @@ test_npm() {
     fi
 }
 
+# The page in a browser, with a scene of others: the EXR that it saves is the program's.
+test_page() {
+    if [ -z "${PHOTONCARD_SKIP_BROWSER:-}" ] && [ -n "${PHOTONCARD_TEST_MODULE:-}" ]; then
+        timeout 900 tests/peers/page.sh "$1" "$PHOTONCARD_TEST_MODULE"
+    fi
+}
+
 # Packages of a release, those of Python and npm and the extension of Blender: twenty minutes, a stage by its name alone.
 check_extensions() {
     step "packages of a release"
@@ -331,6 +338,8 @@ check_extensions() {
     test_blender "$dist" "$(realpath "$program")"
     step "package of npm"
     test_npm "$(realpath "$program")"
+    step "page with a scene of others"
+    test_page "$(realpath "$program")"
     rm -r "$dist"
 }
 
