@@ -84,7 +84,8 @@
 //! are in fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits,
 //! because the code uses only integer arithmetic, `libm`, and `f32` addition, multiplication, division and
 //! square root, never a fused multiply-add.
-// `simd` is exempt, for its vector instructions, and `stack`, which reads a stack as memory.
+// `simd` is exempt, for its vector instructions, `stack`, which reads a stack as memory, and the square root
+// of Arm boards.
 #![deny(unsafe_code)]
 #![no_std]
 // A chip never panics: these lints catch what could, and each exception gives its reason.

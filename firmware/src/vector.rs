@@ -14,6 +14,50 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// Square root, rounded to nearest by IEEE 754, by the processor's instruction.
+#[inline(always)]
+pub(crate) fn sqrt(x: f32) -> f32 {
+    // `libm` has the instructions of x86-64 and AArch64 alone.
+    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    return vsqrt(x);
+    #[cfg(all(target_family = "wasm", target_feature = "simd128"))]
+    {
+        use core::arch::wasm32::{f32x4_extract_lane, f32x4_splat, f32x4_sqrt};
+        f32x4_extract_lane::<0>(f32x4_sqrt(f32x4_splat(x)))
+    }
+    #[cfg(not(any(
+        all(target_arch = "arm", target_abi = "eabihf"),
+        all(target_family = "wasm", target_feature = "simd128")
+    )))]
+    libm::sqrtf(x)
+}
+
+/// The compiler knows no register class of floating-point units of single precision alone: `s0` is kept by
+/// hand. A function of its own, for the size of the code.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[expect(
+    unsafe_code,
+    reason = "an instruction whose operands are copied to and from the registers that it needs"
+)]
+#[inline(never)]
+fn vsqrt(x: f32) -> f32 {
+    let mut bits = x.to_bits();
+    // SAFETY: processors of this ABI have the instruction, and `s0` is as before at the end.
+    unsafe {
+        core::arch::asm!(
+            "vmov {kept}, s0",
+            "vmov s0, {bits}",
+            "vsqrt.f32 s0, s0",
+            "vmov {bits}, s0",
+            "vmov s0, {kept}",
+            bits = inout(reg) bits,
+            kept = out(reg) _,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    f32::from_bits(bits)
+}
+
 /// Mirror direction about a unit normal: `2 (n.d) n - d`.
 #[inline(always)]
 pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
@@ -50,7 +94,7 @@ pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 
 /// Point of the unit disc, uniformly distributed for a uniform point of the unit square.
 pub(crate) fn point_on_disc([u, v]: [f32; 2]) -> [f32; 2] {
     let (sine, cosine) = libm::sincosf(core::f32::consts::TAU * u);
-    let radius = libm::sqrtf(v);
+    let radius = sqrt(v);
     [radius * cosine, radius * sine]
 }
 
@@ -58,7 +102,7 @@ pub(crate) fn point_on_disc([u, v]: [f32; 2]) -> [f32; 2] {
 #[inline(always)]
 pub(crate) fn unit(vector: Vec3) -> Vec3 {
     let length_squared = vector.length_squared();
-    if length_squared > 0.0 { vector * (1.0 / libm::sqrtf(length_squared)) } else { Vec3::ZERO }
+    if length_squared > 0.0 { vector * (1.0 / sqrt(length_squared)) } else { Vec3::ZERO }
 }
 
 /// Maximum component of a vector.

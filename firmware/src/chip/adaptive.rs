@@ -23,6 +23,8 @@
 use glam::Vec3;
 use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
 
+use crate::vector::sqrt;
+
 /// Returns true if the frame has samples whose number of paths depends on the probes.
 pub(super) fn needs_probes(frame: &FrameParameters) -> bool {
     frame.adaptive_threshold.is_some() && frame.first_sample.saturating_add(frame.samples) > PROBES
@@ -93,7 +95,7 @@ impl Probes {
             return Paths::ONE;
         }
         // The conversion saturates.
-        let paths = libm::sqrtf(variance / mean) / threshold + 0.5;
+        let paths = sqrt(variance / mean) / threshold + 0.5;
         Paths((paths as u32).clamp(1, MAX_PATHS) as u8)
     }
 }
@@ -177,7 +179,7 @@ mod tests {
         };
         // Mean 4, variance 16 / 3.
         let lights = [2.0, 2.0, 6.0, 6.0];
-        let ratio = libm::sqrtf(4.0 / 3.0);
+        let ratio = (4.0_f32 / 3.0).sqrt();
         assert_eq!([1.0, 4.0, 9.0, 99.0].map(|k| paths(lights, ratio / k).0), [1, 4, 9, 16]);
         assert_eq!(paths(lights, 10.0), Paths::ONE);
         assert_eq!(paths([0.0; 4], 1e-3), Paths::ONE);

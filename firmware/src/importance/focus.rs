@@ -13,7 +13,7 @@ use glam::Vec3;
 use photoncard_shared::layout::{decode_direction, encode_direction};
 
 use crate::fixed_point::Sum;
-use crate::vector::{about, max, unit};
+use crate::vector::{about, max, sqrt, unit};
 
 /// Number of foci of a direction table.
 pub(super) const FOCI: usize = 4;
@@ -47,7 +47,7 @@ impl Focus {
     fn new(axis: Vec3, spread: f32) -> Self {
         let height = max(HEIGHT_OF_SPREAD * spread, MIN_HEIGHT);
         // The conversion saturates.
-        let width = (libm::sqrtf(height) * WIDTH_STEPS + 0.5) as u8;
+        let width = (sqrt(height) * WIDTH_STEPS + 0.5) as u8;
         Self { axis: encode_direction(axis.to_array()), width, share: 0 }
     }
 
@@ -65,8 +65,8 @@ impl Focus {
     /// Maps a point of the unit square to a direction of the focus, with the density [`Self::density`].
     #[inline(never)]
     pub(super) fn sample(self, [along, across]: [f32; 2]) -> Vec3 {
-        let height = self.height() * (1.0 - libm::sqrtf(max(1.0 - across, 0.0)));
-        let sine = libm::sqrtf(max(height * (2.0 - height), 0.0));
+        let height = self.height() * (1.0 - sqrt(max(1.0 - across, 0.0)));
+        let sine = sqrt(max(height * (2.0 - height), 0.0));
         about(self.axis(), TAU * along, sine, 1.0 - height)
     }
 
@@ -104,9 +104,9 @@ impl Directions {
             return None;
         }
         let sum = Vec3::from_array(self.sum.map(Sum::value));
-        let length = libm::sqrtf(sum.length_squared());
+        let length = sqrt(sum.length_squared());
         let spread = max(1.0 - length / power, 0.0) * photons / (photons - 1.0);
-        let certainty = 1.0 - spread / MAX_SPREAD - DOUBT / libm::sqrtf(photons);
+        let certainty = 1.0 - spread / MAX_SPREAD - DOUBT / sqrt(photons);
         (certainty > 0.0).then(|| (Focus::new(sum, spread), certainty))
     }
 }
@@ -144,7 +144,7 @@ mod tests {
             let mut integral = 0.0;
             for step in 0..steps {
                 let height = focus.height() * (step as f32 + 0.5) / steps as f32;
-                let sine = libm::sqrtf(height * (2.0 - height));
+                let sine = sqrt(height * (2.0 - height));
                 let direction = about(focus.axis(), 1.0, sine, 1.0 - height);
                 integral += focus.density(direction) * TAU * focus.height() / steps as f32;
             }
@@ -156,7 +156,7 @@ mod tests {
                 1.0 / focus.density(focus.sample([radical_inverse(index), across]))
             });
             let angle = inverse.sum::<f32>() / samples as f32 * 0.999;
-            let expected = TAU * focus.height() * (1.0 - libm::sqrtf(0.001));
+            let expected = TAU * focus.height() * (1.0 - sqrt(0.001));
             assert!((angle / expected - 1.0).abs() < 0.01, "{spread}: {angle} {expected}");
         }
     }

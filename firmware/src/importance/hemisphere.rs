@@ -8,7 +8,7 @@ use core::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::vector::{about, max, tangents};
+use crate::vector::{about, max, sqrt, tangents};
 
 /// Number of rows, from the normal to the horizon.
 pub const ROWS: usize = 4;
@@ -56,8 +56,8 @@ pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) ->
     let turn = if row.is_multiple_of(2) { along } else { 1.0 - along };
     let azimuth = (column as f32 + turn) * (2.0 * PI / COLUMNS as f32);
     let sine_squared = (row as f32 + across) * (1.0 / ROWS as f32);
-    let sine = libm::sqrtf(sine_squared);
-    let cosine = libm::sqrtf(max(1.0 - sine_squared, 0.0));
+    let sine = sqrt(sine_squared);
+    let cosine = sqrt(max(1.0 - sine_squared, 0.0));
     about(normal, azimuth, sine, cosine)
 }
 

@@ -510,7 +510,7 @@ mod tests {
                 for j in 0..2 * side {
                     let cosine = (i as f32 + 0.5) / side as f32;
                     let azimuth = (j as f32 + 0.5) * PI / side as f32;
-                    let sine = libm::sqrtf(1.0 - cosine * cosine);
+                    let sine = (1.0 - cosine * cosine).sqrt();
                     let direction = Vec3::new(sine * libm::cosf(azimuth), cosine, sine * libm::sinf(azimuth));
                     let solid_angle = PI / (side * side) as f32;
                     if is_above(direction) {

@@ -8,7 +8,7 @@ use super::{IrradianceCache, LatticePoint};
 use crate::kind::{Capacity, Map};
 use crate::light_groups::GroupedLight;
 use crate::scene::Surface;
-use crate::vector::{max, min};
+use crate::vector::{max, min, sqrt};
 
 /// Minimum sum of the records' weights at which a sample is interpolated.
 const MIN_WEIGHT: f32 = 0.05;
@@ -29,7 +29,7 @@ impl<'a> Corners<'a> {
             // The error without a record is infinite.
             let Some(record) = record else { continue };
             let radius = self.records().fold(record.radius, |radius, other| {
-                let distance = libm::sqrtf((other.position - record.position).length_squared());
+                let distance = sqrt((other.position - record.position).length_squared());
                 min(other.radius + distance, radius)
             });
             *error = record.error(radius, allowed, position, normal);

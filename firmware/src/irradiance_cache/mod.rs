@@ -56,7 +56,7 @@ use crate::kind::{Capacity, Map};
 use crate::light_groups::{GroupedLight, LightGroups};
 use crate::render::{Context, GatherPoint};
 use crate::sampler::{Dimension, Pattern};
-use crate::vector::max;
+use crate::vector::{max, sqrt};
 
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
@@ -225,7 +225,7 @@ impl<R: Capacity> IrradianceCache<R> {
             // The records of all light groups at a lattice point count as one.
             context.counters.records += u64::from(index < self.points);
             let irradiance = sums.limited(&strongest).irradiance(unit, record.distance);
-            let reach = libm::sqrtf(allowed) * record.radius;
+            let reach = sqrt(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }
         Ok(())

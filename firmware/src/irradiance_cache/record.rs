@@ -9,7 +9,7 @@ use super::packed_normal::PackedNormal;
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::scene::Surface;
-use crate::vector::{from_upper_half, max, min, tangents, upper_half};
+use crate::vector::{from_upper_half, max, min, sqrt, tangents, upper_half};
 
 /// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -227,7 +227,7 @@ impl Record {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
         let height = way.dot(self.normal + normal) * 0.5;
-        let height_allowed = min(PLANE_SHARE * libm::sqrtf(allowed) * radius, FREE_SHARE * self.distance);
+        let height_allowed = min(PLANE_SHARE * sqrt(allowed) * radius, FREE_SHARE * self.distance);
         if cosine <= 0.0 || height > height_allowed || height < -height_allowed {
             return f32::INFINITY;
         }
@@ -254,7 +254,7 @@ impl Irradiance {
     pub(super) fn limited(mut self, distance: f32) -> Self {
         let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));
-        let length = libm::sqrtf(x * x + y * y);
+        let length = sqrt(x * x + y * y);
         if length > greatest {
             self.translation = self.translation.map(|component| component * (greatest / length));
         }

@@ -20,7 +20,7 @@ use crate::render::{Context, eye};
 use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::camera::pixel_side;
 use crate::scene::{BUNDLE_RAYS, Ray, RayKind, Surface, closest_hits};
-use crate::vector::min;
+use crate::vector::{min, sqrt};
 
 /// Minimum of `radius of validity * sqrt(allowed error)`, pixels: the distance up to which a record is valid.
 /// It bounds the number of records in the corners of a room.
@@ -195,7 +195,7 @@ fn new_record<M: MemoryPort>(
     Ok(surface.map(|surface| {
         let reach =
             MIN_REACH * min(allowed / ERROR_OF_MIN_REACH, 1.0) * pixel_side(context.frame, surface.position);
-        let least = reach / libm::sqrtf(allowed);
+        let least = reach / sqrt(allowed);
         Record::new(&surface, least)
     }))
 }

@@ -11,6 +11,7 @@ use super::candidates::{Candidate, Candidates};
 use super::collector::{Collector, Lanes};
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
+use crate::vector::sqrt;
 
 /// Factor by which the squared radius grows when a search is repeated.
 const WIDER: f32 = 3.0;
@@ -175,7 +176,7 @@ impl<'a> NearestPhotons<'a> {
     pub fn radius(&self) -> f32 {
         let (distances, _) = self.columns();
         let farthest = distances.iter().copied().max().filter(|_| self.is_full());
-        libm::sqrtf(farthest.map_or(self.max_distance_squared, f32::from_bits))
+        sqrt(farthest.map_or(self.max_distance_squared, f32::from_bits))
     }
 
     /// Square of the maximum distance given to [`Self::new`], m^2.

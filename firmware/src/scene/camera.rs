@@ -7,7 +7,7 @@ use photoncard_shared::message::{Camera, Fault, FaultCode, FrameParameters, Proj
 
 use super::{Ray, RayKind, SceneImage, Surface, read_slot};
 use crate::memory::MemoryPort;
-use crate::vector::{max, max_component, min, unit};
+use crate::vector::{max, max_component, min, sqrt, unit};
 
 /// Point of the picture and of the lens from which a ray starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +100,7 @@ pub fn sensor(
 pub fn depth(camera: &Camera, position: Vec3) -> f32 {
     let from_origin = position - Vec3::from_array(camera.origin);
     match camera.projection {
-        Projection::Panorama { .. } => libm::sqrtf(from_origin.length_squared()),
+        Projection::Panorama { .. } => sqrt(from_origin.length_squared()),
         _ => from_origin.dot(camera.forward.into()),
     }
 }
@@ -116,7 +116,7 @@ pub fn depth_per_distance(camera: &Camera, direction: Vec3) -> f32 {
 /// Height that a pixel covers at the depth of a position, metres.
 pub fn pixel_side(frame: &FrameParameters, position: Vec3) -> f32 {
     let camera = &frame.camera;
-    let up = || libm::sqrtf(Vec3::from_array(camera.up).length_squared());
+    let up = || sqrt(Vec3::from_array(camera.up).length_squared());
     let half_height = match camera.projection {
         Projection::Pinhole | Projection::ThinLens { .. } => depth(camera, position) * up(),
         Projection::Orthographic => up(),

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use crate::vector::{max, min, mirror, unit};
+use crate::vector::{max, min, mirror, sqrt, unit};
 
 /// Minimum cosine between a shading normal and the direction to the viewer.
 const MIN_COSINE: f32 = 0.01;
@@ -50,11 +50,11 @@ pub(super) fn bent(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3
     }
     let aside = unit(normal - geometric_normal * geometric_normal.dot(normal));
     let along = aside.dot(outgoing);
-    let radius = libm::sqrtf(along * along + height * height);
+    let radius = sqrt(along * along + height * height);
     let cosine = min(least / radius, 1.0);
-    let sine = libm::sqrtf(1.0 - cosine * cosine);
+    let sine = sqrt(1.0 - cosine * cosine);
     let twice = (height * cosine - along * sine) / radius;
-    let [x, z] = [1.0 - twice, 1.0 + twice].map(|square| libm::sqrtf(max(0.5 * square, 0.0)));
+    let [x, z] = [1.0 - twice, 1.0 + twice].map(|square| sqrt(max(0.5 * square, 0.0)));
     aside * x + geometric_normal * z
 }
 

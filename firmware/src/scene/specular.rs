@@ -4,7 +4,7 @@ use glam::Vec3;
 use photoncard_shared::layout::{Material, PANE, THIN_WALLED};
 
 use super::shading_normal::bent;
-use crate::vector::{max, mirror, unit};
+use crate::vector::{max, mirror, sqrt, unit};
 
 /// Perfectly specular reflection and transmission at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,7 +187,7 @@ fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     if cosine_squared.is_nan() || cosine_squared <= 0.0 {
         return (1.0, 0.0);
     }
-    let behind = libm::sqrtf(cosine_squared);
+    let behind = sqrt(cosine_squared);
     let parallel = (index * cosine - behind) / (index * cosine + behind);
     let perpendicular = (cosine - index * behind) / (cosine + index * behind);
     (0.5 * (parallel * parallel + perpendicular * perpendicular), behind)

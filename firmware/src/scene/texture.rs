@@ -7,7 +7,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::SceneImage;
 use crate::memory::MemoryPort;
-use crate::vector::{max, min};
+use crate::vector::{max, min, sqrt};
 
 const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 
@@ -187,7 +187,7 @@ pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
         TexelFormat::NormalPair => {
             let [first, second] = pair(texel);
             let [x, y] = [first, second].map(|channel| 2.0 * channel - 1.0);
-            let z = libm::sqrtf(max(1.0 - (x * x + y * y), 0.0));
+            let z = sqrt(max(1.0 - (x * x + y * y), 0.0));
             [first, second, 0.5 * z + 0.5, 1.0]
         }
     }

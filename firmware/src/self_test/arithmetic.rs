@@ -6,6 +6,8 @@
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 
+use crate::vector::sqrt;
+
 /// Expressions that the self-test computes, as text, with the operands `a`, `b` and `c`. `bits` gives the
 /// bits of its arguments as one integer.
 pub const EXPRESSIONS: [&str; RESULTS] = [
@@ -52,7 +54,7 @@ pub fn compute([a, b, c]: [f32; 3]) -> [u32; RESULTS] {
         bits(a / b),
         bits(a * b + c),
         bits(c - a * b),
-        bits(libm::sqrtf(a)),
+        bits(sqrt(a)),
         bits(libm::floorf(a)),
         bits(libm::ceilf(a)),
         bits(of_c as i32 as f32),

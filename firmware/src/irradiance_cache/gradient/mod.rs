@@ -10,6 +10,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 
 use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre};
 use crate::render::GatherPoint;
+use crate::vector::sqrt;
 
 /// Distance from a record to its surroundings in each cell, divided by the harmonic mean of the distances.
 /// Stored as logarithmic 8-bit codes.
@@ -79,14 +80,14 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
         for row in 1..ROWS {
             // Border between rows: sin cos^2 times the column's angle, over pi.
             let sine_squared = row as f32 / ROWS as f32;
-            let length = 2.0 / COLUMNS as f32 * libm::sqrtf(sine_squared) * (1.0 - sine_squared);
+            let length = 2.0 / COLUMNS as f32 * sqrt(sine_squared) * (1.0 - sine_squared);
             border([cell_at(row - 1, column), cell_at(row, column)], length, azimuth);
         }
         let before = (column + COLUMNS - 1) % COLUMNS;
         let across = column as f32 * column_angle + 0.5 * PI;
         for row in 0..ROWS {
             // Border between columns: the difference of the sines of its ends, over pi.
-            let sine = |row: usize| libm::sqrtf(row as f32 / ROWS as f32);
+            let sine = |row: usize| sqrt(row as f32 / ROWS as f32);
             let length = (sine(row + 1) - sine(row)) * FRAC_1_PI;
             border([cell_at(row, before), cell_at(row, column)], length, across);
         }
@@ -104,7 +105,7 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
 /// Weight of a gather ray in cell `cell` in the rotational gradient, along tangent and bitangent.
 pub(super) fn rotation(cell: u8) -> [f32; 2] {
     let [azimuth, sine_squared] = cell_centre(cell);
-    let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));
+    let tangent = sqrt(sine_squared / (1.0 - sine_squared));
     // The axis about which the normal turns towards the cell is perpendicular to the cell's azimuth.
     let (sine, cosine) = libm::sincosf(azimuth);
     [-tangent * sine, tangent * cosine]

@@ -12,7 +12,7 @@ use super::choice::{Fraction, choose};
 use super::sample::LightSample;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
-use crate::vector::{about, max, unit};
+use crate::vector::{about, max, sqrt, unit};
 
 const LIGHTS_PER_LINE: u32 = DistantLight::PER_LINE as u32;
 
@@ -25,7 +25,7 @@ pub fn disk_direction(axis: Vec3, spread: f32, [u, v]: [f32; 2]) -> Vec3 {
     }
     // 1 minus the cosine of the angle to the axis: the sine follows without cancellation.
     let height = u * spread;
-    let sine = libm::sqrtf(max(height * (2.0 - height), 0.0));
+    let sine = sqrt(max(height * (2.0 - height), 0.0));
     unit(about(axis, TAU * v, sine, 1.0 - height))
 }
 

@@ -15,7 +15,7 @@ use crate::scene::corners::Corners;
 use crate::scene::coverage::coverage;
 use crate::scene::materials::read_material;
 use crate::scene::{SceneImage, magnitude, offset_origin, read_texture, sample_texture};
-use crate::vector::{max, min, unit};
+use crate::vector::{max, min, sqrt, unit};
 
 const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 
@@ -219,7 +219,7 @@ fn from_area(
     let normal = if is_front { target.normal } else { -target.normal };
     let way = offset_origin(target.position, normal, target.magnitude) - receiver.origin;
     let distance_squared = way.length_squared();
-    let distance = libm::sqrtf(distance_squared);
+    let distance = sqrt(distance_squared);
     let direction = way / distance;
     let cosine = -normal.dot(direction);
     let density = density * (distance_squared / cosine);
@@ -243,7 +243,7 @@ fn from_point(
 ) -> Option<LightSample> {
     let way = position - receiver.origin;
     let distance_squared = way.length_squared();
-    let distance = libm::sqrtf(distance_squared);
+    let distance = sqrt(distance_squared);
     let direction = way / distance;
     let irradiance = intensity(direction) / (probability * distance_squared);
     // At distance 0 there is no direction.
@@ -253,7 +253,7 @@ fn from_point(
 /// Area of a triangle, m^2.
 fn area(vertices: [[f32; 3]; 3]) -> f32 {
     let [a, b, c] = vertices.map(Vec3::from_array);
-    0.5 * libm::sqrtf((b - a).cross(c - a).length_squared())
+    0.5 * sqrt((b - a).cross(c - a).length_squared())
 }
 
 /// Area-preserving map of the unit square to the triangle `p, q >= 0, p + q <= 1` (Heitz 2019, *A

@@ -14,21 +14,21 @@ use super::choice::{Fraction, choose, probability};
 use super::sample::LightSample;
 use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
-use crate::vector::{max, min};
+use crate::vector::{max, min, sqrt};
 
 /// Coordinates of a direction on the equirectangular map, `[from the left, from the top]`, each 0 to 1. The
 /// centre of the map is the direction -z; its top is +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
-    [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
+    [across, libm::atan2f(sqrt(x * x + z * z), y) * FRAC_1_PI]
 }
 
 /// Unit vector at a position of the equirectangular map: `across` is the horizontal coordinate, 0 to 1 from
 /// the left, and `cosine` is the cosine of the angle to +y.
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
-    let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     let (x, z) = libm::sincosf(angle);
     Vec3::new(sine * x, cosine, -sine * z)
 }

@@ -23,7 +23,7 @@ use super::choice::Fraction;
 use super::sample::Receiver;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
-use crate::vector::{max, unit};
+use crate::vector::{max, sqrt, unit};
 
 const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 const TRAIL_BITS: usize = 2;
@@ -283,12 +283,12 @@ impl Angle {
     const ZERO: Self = Self { cosine: 1.0, sine: 0.0 };
 
     fn of_cosine(cosine: f32) -> Self {
-        Self { cosine, sine: libm::sqrtf(max(1.0 - cosine * cosine, 0.0)) }
+        Self { cosine, sine: sqrt(max(1.0 - cosine * cosine, 0.0)) }
     }
 
     /// Angle from 0 to pi / 2 whose sine has the square `squared`.
     fn of_sine_squared(squared: f32) -> Self {
-        Self { cosine: libm::sqrtf(max(1.0 - squared, 0.0)), sine: libm::sqrtf(squared) }
+        Self { cosine: sqrt(max(1.0 - squared, 0.0)), sine: sqrt(squared) }
     }
 
     /// Difference of two angles; 0 if `other` is greater.

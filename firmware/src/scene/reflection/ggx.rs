@@ -18,7 +18,7 @@ use core::f32::consts::PI;
 use glam::Vec3;
 
 use super::ggx_albedo::albedo_shares;
-use crate::vector::{about, max, max_component, min, mirror, unit};
+use crate::vector::{about, max, max_component, min, mirror, sqrt, unit};
 
 /// Minimum of `a`. At this `a`, the lobe is 0.06 degrees wide, and `f32` still resolves the half vector
 /// within it.
@@ -148,7 +148,7 @@ impl GgxLobe {
 
     /// Roughness, `sqrt(a)`.
     pub(super) fn roughness(&self) -> f32 {
-        libm::sqrtf(self.alpha)
+        sqrt(self.alpha)
     }
 
     /// BRDF `f`, 1/sr.
@@ -217,7 +217,7 @@ fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) ->
     let stretched = unit(flat * alpha + normal * height);
     let top = normal.dot(stretched);
     let z = (1.0 - v) * (1.0 + top) - top;
-    let sine = libm::sqrtf(max(1.0 - z * z, 0.0));
+    let sine = sqrt(max(1.0 - z * z, 0.0));
     let cap = about(normal, 2.0 * PI * u, sine, z) + stretched;
     let cap_height = normal.dot(cap);
     unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
@@ -258,7 +258,7 @@ pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
 #[inline(always)]
 fn length(alpha: f32, cosine: f32) -> f32 {
     let squared = alpha * alpha;
-    libm::sqrtf(squared + (1.0 - squared) * cosine * cosine)
+    sqrt(squared + (1.0 - squared) * cosine * cosine)
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 //! 2^17 directions sampled by visible normals. The error of interpolated values is at most 0.004 for cosines
 //! above 0.2, and 0.02 below.
 
+use crate::vector::sqrt;
+
 /// Number of rows (roughness 0 to 1) and of columns (square root of the cosine, 0 to 1) of a table.
 pub(super) const SIDE: usize = 16;
 
@@ -19,7 +21,7 @@ pub(super) fn albedo_shares(roughness: f32, cosine: f32) -> [f32; 2] {
 #[inline(always)]
 pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f32) -> f32 {
     let (row, down) = cell(roughness);
-    let (column, across) = cell(libm::sqrtf(if cosine > 0.0 { cosine } else { 0.0 }));
+    let (column, across) = cell(sqrt(if cosine > 0.0 { cosine } else { 0.0 }));
     let entry = |row: usize, column: usize| {
         table.get(row).and_then(|row| row.get(column)).map_or(0.0, |&share| f32::from(share))
     };

@@ -16,7 +16,7 @@ use super::material::{Scattering, Texel, View, scattering};
 use super::metallic_roughness::MetallicRoughness;
 use super::sheen::SheenLobe;
 use crate::scene::specular::{Bounds, Glass, Specular};
-use crate::vector::{max, max_component};
+use crate::vector::{max, max_component, sqrt};
 
 /// Lower limit of a layer's share in the sum of albedos. It bounds the weight of a sample.
 const MIN_PROBABILITY: f32 = 1.0 / 8.0;
@@ -280,7 +280,7 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
         return (reflected, Reflection { diffuse: Vec3::ZERO, lobe });
     }
     let microfacet = microfacet(normal, outgoing, roughness, point);
-    let tint = Vec3::from_array(colour.to_array().map(libm::sqrtf));
+    let tint = Vec3::from_array(colour.to_array().map(sqrt));
     let absorption = Vec3::from(absorption);
     let glass = Glass { base: tint, absorption, transmission, ior, specular, bounds: Bounds::Solid };
     let (_, refracted) = glass.at(outgoing, [microfacet, geometric_normal], !is_front);

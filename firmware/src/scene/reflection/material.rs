@@ -9,6 +9,7 @@ use super::lobe::Lobe;
 use super::metallic_roughness::MetallicRoughness;
 use crate::scene::shading_normal::bent;
 use crate::scene::specular::{Bounds, Glass, Specular};
+use crate::vector::sqrt;
 
 /// Values of textures and vertex colours at a point, by which a material's factors are multiplied.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +97,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             let is_thin = bounds == Bounds::ThinWall;
             let (base, absorption) = (Vec3::from(base) * texel.colour, Vec3::from(absorption));
             // Light passes a volume's surface twice, and is tinted once.
-            let tint = if is_thin { base } else { Vec3::from_array(base.to_array().map(libm::sqrtf)) };
+            let tint = if is_thin { base } else { Vec3::from_array(base.to_array().map(sqrt)) };
             let glass = Glass { base: tint, absorption, transmission, ior, specular, bounds };
             let (scattered, specular) = glass.at(outgoing, normals, !is_front);
             // Metal is opaque.

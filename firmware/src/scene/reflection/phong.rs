@@ -6,7 +6,7 @@ use core::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 
-use crate::vector::{about, max, max_component};
+use crate::vector::{about, max, max_component, sqrt};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PhongLobe {
@@ -60,7 +60,7 @@ impl PhongLobe {
     #[inline(always)]
     pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));
-        let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
+        let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
         about(mirror, 2.0 * PI * u, sine, cosine)
     }
 }

@@ -94,7 +94,7 @@ mod tests {
         for index in 0..81 {
             let [colour, roughness, cosine, front] = shares(index);
             let texel = Texel { colour: Vec3::splat(colour), roughness, metallic };
-            let outgoing = Vec3::new(libm::sqrtf(1.0 - cosine * cosine), cosine, 0.0);
+            let outgoing = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
             sights.push((texel, View { outgoing, normals: [Vec3::Y; 2], is_front: front > 0.0 }));
         }
         sights

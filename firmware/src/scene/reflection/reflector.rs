@@ -22,7 +22,7 @@ use super::ggx::Geometry;
 use super::lobe::Lobe;
 use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
-use crate::vector::{from_frame, max, max_component, mirror};
+use crate::vector::{from_frame, max, max_component, mirror, sqrt};
 
 /// Sampled direction, and the weight of the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -306,7 +306,7 @@ fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         if a * a > b * b { (a, (PI / 4.0) * (b / a)) } else { (b, (PI / 2.0) - (PI / 4.0) * (a / b)) };
     let (sine, cosine) = libm::sincosf(angle);
     let (x, y) = (radius * cosine, radius * sine);
-    from_frame(normal, x, y, libm::sqrtf(max(1.0 - x * x - y * y, 0.0)))
+    from_frame(normal, x, y, sqrt(max(1.0 - x * x - y * y, 0.0)))
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use core::f32::consts::PI;
 use glam::Vec3;
 
 use super::ggx_albedo::{SIDE, interpolated};
-use crate::vector::{about, max, max_component, unit};
+use crate::vector::{about, max, max_component, sqrt, unit};
 
 /// Minimum roughness. A smaller roughness would reflect more light than arrives at grazing angles.
 const MIN_ROUGHNESS: f32 = 0.25;
@@ -80,7 +80,7 @@ impl SheenLobe {
 
     /// Maps a point of the unit square to a direction above the surface, uniformly in solid angle.
     pub(super) fn direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
-        let sine = libm::sqrtf(max(1.0 - v * v, 0.0));
+        let sine = sqrt(max(1.0 - v * v, 0.0));
         about(normal, 2.0 * PI * u, sine, v)
     }
 }
