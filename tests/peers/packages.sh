@@ -59,11 +59,11 @@ suzi-draco pmndrs-assets package/models/suzi.glb white
 END
 }
 
-# The path of a file of a package, fetched if it is not there.
+# The path of a file of a package, fetched if it is not there. Failures are returned: a substitution does not end at them.
 package_file() {
     local name=$1 path=$2 address checksum
     read -r _ address checksum < <(packages | grep "^$name ")
-    fetch "$name" "$address" "$checksum" >&2
+    fetch "$name" "$address" "$checksum" >&2 || return
     echo "$package_folder/$name/$path"
 }
 
@@ -72,15 +72,15 @@ fetch() {
     local archive=$package_folder/packages/$name-${checksum:0:8} partial=$package_folder/$name.partial
     mkdir -p "$package_folder/packages"
     if [ ! -e "$archive" ]; then
-        curl --fail --silent --show-error --location --output "$archive.partial" "$address"
-        echo "$checksum  $archive.partial" | sha256sum --check --quiet
+        curl --fail --silent --show-error --location --output "$archive.partial" "$address" || return
+        echo "$checksum  $archive.partial" | sha256sum --check --quiet || return
         mv "$archive.partial" "$archive"
     fi
     [ -d "$package_folder/$name" ] && return
     mkdir -p "$partial"
     case $address in
-        *.whl) python3 -m zipfile -e "$archive" "$partial" ;;
-        *) tar -xzf "$archive" -C "$partial" ;;
+        *.whl) python3 -m zipfile -e "$archive" "$partial" || return ;;
+        *) tar -xzf "$archive" -C "$partial" || return ;;
     esac
     # This package keeps each model as a JavaScript module around a data URI.
     if [ "$name" = pmndrs-assets ]; then

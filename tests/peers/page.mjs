@@ -65,14 +65,16 @@ async function browse(command) {
 
 function native(command, cards) {
     const folder = mkdtempSync(join(tmpdir(), "native-"));
-    const begun = performance.now();
-    const words = ["-c", `TIMEFORMAT='%U %S'; cd '${resolve(site)}' && time ${command.replace("-o picture.exr", `-o ${folder}/picture.exr`)} --card emulated:${cards} --threads ${cards} --quiet`];
-    const run = spawnSync("bash", words, { env: { ...process.env, PATH: `${resolve(program, "..")}:${process.env.PATH}` }, encoding: "utf8" });
-    if (run.status !== 0) throw new Error(run.stderr);
-    const [user, system] = run.stderr.trim().split("\n").pop().split(" ").map(Number);
-    const wall = (performance.now() - begun) / 1000, written = readFileSync(join(folder, "picture.exr"));
-    rmSync(folder, { recursive: true });
-    return { wall, cpu: user + system, written };
+    try {
+        const begun = performance.now();
+        const words = ["-c", `TIMEFORMAT='%U %S'; cd '${resolve(site)}' && time ${command.replace("-o picture.exr", `-o ${folder}/picture.exr`)} --card emulated:${cards} --threads ${cards} --quiet`];
+        const run = spawnSync("bash", words, { env: { ...process.env, PATH: `${resolve(program, "..")}:${process.env.PATH}` }, encoding: "utf8" });
+        if (run.status !== 0) throw new Error(run.stderr);
+        const [user, system] = run.stderr.trim().split("\n").pop().split(" ").map(Number);
+        return { wall: (performance.now() - begun) / 1000, cpu: user + system, written: readFileSync(join(folder, "picture.exr")) };
+    } finally {
+        rmSync(folder, { recursive: true });
+    }
 }
 
 console.log("| scene | cards | first, s | settled, s | CPU s | native, s | CPU s | CPU, times |");

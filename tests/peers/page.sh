@@ -4,7 +4,7 @@
 #
 #   tests/peers/page.sh PHOTONCARD MODULE
 #
-# It needs Chromium, Node.js 20 with npx, and the network.
+# It needs Chromium, Node.js 20 with npx, and the network. The status is 75 if the helmet cannot be had.
 set -euo pipefail
 [ $# = 2 ] && [ -x "$1" ] && [ -f "$2" ] || {
     echo "usage: $0 PHOTONCARD MODULE, such as target/release/photoncard and a module by host-cli/module.sh" >&2
@@ -16,8 +16,11 @@ cd "$(dirname "$0")/../.."
 source tests/peers/packages.sh
 folder=$(realpath -m "${CARGO_TARGET_DIR:-target}")/peers/page
 mkdir -p "$folder"
-[ -f "$folder/flight-helmet.glb" ] ||
-    npx --yes gltf-pipeline@4.3.1 -i "$(package_file bevy_webgl2 bevy_webgl2-0.4.0/assets/models/FlightHelmet/FlightHelmet.gltf)" \
-        -o "$folder/flight-helmet.glb" >&2
+helmet() {
+    local source
+    source=$(package_file bevy_webgl2 bevy_webgl2-0.4.0/assets/models/FlightHelmet/FlightHelmet.gltf) &&
+        npx --yes gltf-pipeline@4.3.1 -i "$source" -o "$folder/flight-helmet.glb" >&2
+}
+[ -f "$folder/flight-helmet.glb" ] || helmet || exit 75
 "$photoncard" page "$folder/site" --scene "$folder/flight-helmet.glb" --module "$module" >&2
 exec node --experimental-websocket tests/peers/page.mjs "$photoncard" "$folder/site" "scenes/flight-helmet.glb --environment 0.5,0.5,0.5"
