@@ -64,6 +64,18 @@ function heard({ method, params }) {
     return null;
 }
 
+// Removes a folder in which processes that end still write: retries of `rmSync` do not read the folder again.
+async function removed(folder) {
+    for (let tries = 1; ; tries++) {
+        try {
+            return rmSync(folder, { recursive: true, force: true });
+        } catch (error) {
+            if (tries === 50) throw error;
+        }
+        await new Promise(act => setTimeout(act, 100));
+    }
+}
+
 // One page in a browser of its own.
 export class Tab {
     #process;
@@ -167,6 +179,6 @@ export class Tab {
         clearInterval(this.#timer);
         this.#process.kill();
         await new Promise(act => this.#process.once("exit", act));
-        rmSync(this.#profile, { recursive: true, force: true, maxRetries: 50, retryDelay: 100 });
+        await removed(this.#profile);
     }
 }
