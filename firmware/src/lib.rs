@@ -85,7 +85,7 @@
 //! because the code uses only integer arithmetic, `libm`, and `f32` addition, multiplication, division and
 //! square root, never a fused multiply-add.
 // `simd` is exempt, for its vector instructions, `stack`, which reads a stack as memory, and the square root
-// of Arm boards.
+// on Arm with hardware floats.
 #![deny(unsafe_code)]
 #![no_std]
 // A chip never panics: these lints catch what could, and each exception gives its reason.

@@ -59,7 +59,7 @@ suzi-draco pmndrs-assets package/models/suzi.glb white
 END
 }
 
-# The path of a file of a package, fetched if it is not there. Failures are returned: a substitution does not end at them.
+# The path of a file of a package, fetched if it is not there. Failures are returned, as a substitution does not end at them: 75 if the network fails.
 package_file() {
     local name=$1 path=$2 address checksum
     read -r _ address checksum < <(packages | grep "^$name ")
@@ -70,14 +70,14 @@ package_file() {
 fetch() {
     local name=$1 address=$2 checksum=$3
     local archive=$package_folder/packages/$name-${checksum:0:8} partial=$package_folder/$name.partial
-    mkdir -p "$package_folder/packages"
+    mkdir -p "$package_folder/packages" || return
     if [ ! -e "$archive" ]; then
-        curl --fail --silent --show-error --location --output "$archive.partial" "$address" || return
+        curl --fail --silent --show-error --location --output "$archive.partial" "$address" || return 75
         echo "$checksum  $archive.partial" | sha256sum --check --quiet || return
-        mv "$archive.partial" "$archive"
+        mv "$archive.partial" "$archive" || return
     fi
     [ -d "$package_folder/$name" ] && return
-    mkdir -p "$partial"
+    mkdir -p "$partial" || return
     case $address in
         *.whl) python3 -m zipfile -e "$archive" "$partial" || return ;;
         *) tar -xzf "$archive" -C "$partial" || return ;;
@@ -86,7 +86,7 @@ fetch() {
     if [ "$name" = pmndrs-assets ]; then
         local module
         for module in "$partial"/package/models/*.glb.js; do
-            sed 's/.*base64,\([A-Za-z0-9+\/=]*\).*/\1/' "$module" | base64 --decode >"${module%.js}"
+            sed 's/.*base64,\([A-Za-z0-9+\/=]*\).*/\1/' "$module" | base64 --decode >"${module%.js}" || return
         done
     fi
     mv "$partial" "$package_folder/$name"

@@ -132,6 +132,8 @@ fn cases() -> Vec<[f32; 3]> {
         [16_777_217.0, 2_147_483_648.0, -2_147_483_648.0],
         [9.223_372e18, f32::INFINITY, -0.0],
         [f32::NAN, -1.5, f32::NEG_INFINITY],
+        [f32::INFINITY, 1.0, 1.0],
+        [-0.0, 1.0, 1.0],
     ];
     let random = (0..RANDOM_CASES).map(|case| {
         [0, 1, 2].map(|operand| {

@@ -111,28 +111,29 @@ fn a_page_with_its_own_host_settles_to_the_picture_of_the_shown_command() {
     assert_eq!(tab.faults, Vec::<String>::new());
 }
 
-/// Checks a small picture of a scene in Firefox.
-fn check_in_firefox(scene: &str, options: &str) {
+/// Checks small pictures of scenes in Firefox.
+fn check_in_firefox(scenes: &[&str], options: &str) {
     let Some(mut firefox) = Firefox::start() else { return };
     let room = Room::new();
-    let Some(server) = site_of(&room, &[scene]) else { return };
-    let name = Path::new(scene).file_name().and_then(OsStr::to_str).unwrap();
+    let Some(server) = site_of(&room, scenes) else { return };
     std::fs::create_dir_all(room.path("scenes")).unwrap();
-    std::fs::copy(scene, room.path(&format!("scenes/{name}"))).unwrap();
-    open(&mut firefox, &server, &format!("photoncard render scenes/{name} {SMALL} {options}"));
-    check_shown(&room, &mut firefox);
+    for scene in scenes {
+        let name = Path::new(scene).file_name().and_then(OsStr::to_str).unwrap();
+        std::fs::copy(scene, room.path(&format!("scenes/{name}"))).unwrap();
+        open(&mut firefox, &server, &format!("photoncard render scenes/{name} {SMALL} {options}"));
+        check_shown(&room, &mut firefox);
+    }
 }
 
 #[test]
 fn firefox_settles_to_the_same_picture() {
-    check_in_firefox(&shipped("cornell.gltf"), "");
-    check_in_firefox(&shipped("room.glb"), "");
+    check_in_firefox(&[&shipped("cornell.gltf"), &shipped("room.glb")], "");
 }
 
 #[test]
 #[ignore = "PHOTONCARD_TEST_SCENE names a glb without lights, such as that of tests/peers/page.sh"]
 fn firefox_settles_to_the_same_picture_of_a_file_of_others() {
-    check_in_firefox(&std::env::var("PHOTONCARD_TEST_SCENE").unwrap(), "--environment 0.5,0.5,0.5");
+    check_in_firefox(&[&std::env::var("PHOTONCARD_TEST_SCENE").unwrap()], "--environment 0.5,0.5,0.5");
 }
 
 /// Performs 500 random actions on a scene with two lights, and checks the picture that they end at.
